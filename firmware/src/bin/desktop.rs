@@ -1,0 +1,269 @@
+//! The desktop arm: the firmware of the drawing arm with sockets, files and a picture.
+
+use clap::{Args, Parser, Subcommand};
+use core::net::SocketAddr;
+use embassy_embedded_hal::adapter::BlockingAsync;
+use embassy_executor::{SpawnError, Spawner};
+use embassy_time::{Duration, Timer};
+use firmware::boards::desktop::clock::{self, Speed};
+use firmware::boards::desktop::draw::{self, Answers, Outcome, Script};
+use firmware::boards::desktop::flash::{self, FileFlash};
+use firmware::boards::desktop::net::Listener;
+use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
+use firmware::boards::desktop::{IDENTITY, VITALS};
+use firmware::services::House;
+use firmware::services::line_us::{Server, serve};
+use firmware::services::storage::Memory;
+use indicatif::{ProgressBar, ProgressStyle};
+use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
+use protocol_core::motion::Micros;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+type Flash = BlockingAsync<FileFlash>;
+
+/// A drawing arm without the arm: the real firmware on this computer.
+///
+/// Point any Line-us program at the address it prints, and watch the picture appear.
+#[derive(Parser)]
+#[command(version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    serve: Serve,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Draw a G-code file as fast as possible, and tell what the arm did
+    ///
+    /// The file goes through the same session and the same arm as a client's commands. The exit status
+    /// is 1 when a line was refused.
+    Draw(Draw),
+}
+
+#[derive(Args)]
+struct Serve {
+    /// Where Line-us clients connect
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
+    line_us: SocketAddr,
+    /// Where the arm keeps its name and calibration, made if it does not exist
+    #[arg(long, value_name = "FILE", default_value = "quill.state")]
+    state: PathBuf,
+    /// How fast the arm's time runs: a factor, or 'max' for as fast as possible
+    #[arg(long, value_name = "FACTOR", default_value = "1")]
+    speed: Speed,
+    /// How long the pen stays down after its client has gone, in seconds
+    #[arg(long, value_name = "SECONDS", default_value = "5")]
+    lift_after: u32,
+    /// The picture, SVG or PNG, rewritten whenever the arm comes to rest
+    #[arg(long, value_name = "FILE", default_value = "drawing.svg")]
+    picture: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Args)]
+struct Draw {
+    /// G-code, a command a line
+    file: PathBuf,
+    /// A picture of what the servos did, SVG or PNG
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Args)]
+struct Common {
+    /// A row for each servo frame of the moving arm: time, position, pulses
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Time between two set-points of the servos, in microseconds
+    #[arg(long, value_name = "N", default_value = "10000", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    frame_us: u32,
+}
+
+impl Common {
+    fn frame(&self) -> Duration {
+        Duration::from_micros(self.frame_us.into())
+    }
+}
+
+fn main() -> ExitCode {
+    env_logger::Builder::new()
+        .filter_level(log::LevelFilter::Info)
+        .format(|out, record| writeln!(out, "{}", record.args()))
+        .target(env_logger::Target::Stdout)
+        .init();
+    let cli = Cli::parse();
+    let outcome = match cli.command {
+        Some(Command::Draw(options)) => draw_file(options),
+        None => run_arm(cli.serve),
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        ExitCode::FAILURE
+    })
+}
+
+/// Serves until the program is told to stop.
+fn run_arm(options: Serve) -> io::Result<ExitCode> {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let named = |what: &dyn std::fmt::Display, error: io::Error| {
+        io::Error::new(error.kind(), format!("{what}: {error}"))
+    };
+    let listener = embassy_futures::block_on(Listener::bind(options.line_us))
+        .map_err(|error| named(&options.line_us, error))?;
+    let listener: &'static Listener = Box::leak(Box::new(listener));
+    let flash =
+        FileFlash::open(&options.state).map_err(|error| named(&options.state.display(), error))?;
+    let data = ArmData {
+        lift_after: Micros::from_secs(options.lift_after),
+        ..ArmData::default()
+    };
+    let outputs = Outputs {
+        trace: options.common.trace.clone(),
+        picture: Some(options.picture.clone()),
+    };
+    let (recorder, servos) = Recorder::start(outputs, data, options.speed == Speed::Max)?;
+    let (house, memory) = house(data, flash)?;
+    let frame = options.common.frame();
+    ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed)).map_err(io::Error::other)?;
+
+    log::info!("{} is ready.", house.name().as_str());
+    log::info!("  Line-us clients: {}", options.line_us);
+    log::info!("  picture:         {}", options.picture.display());
+    log::info!("  stop with Ctrl-C");
+    let mut spawned = Ok(());
+    clock::run(
+        options.speed,
+        |spawner| spawned = serve_clients(spawner, house, memory, servos, frame, listener),
+        || STOP.load(Ordering::Relaxed),
+    );
+    spawned.map_err(io::Error::other)?;
+    recorder.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn serve_clients(
+    spawner: Spawner,
+    house: &'static House,
+    memory: Memory<Flash>,
+    servos: RecordedServos,
+    frame: Duration,
+    listener: &'static Listener,
+) -> Result<(), SpawnError> {
+    static SERVER: Server = Server::new();
+    spawner.spawn(arm(house, servos, frame)?);
+    spawner.spawn(storage(house, memory)?);
+    for client in (0..).map_while(Client::new) {
+        spawner.spawn(worker(listener, client, house)?);
+    }
+    spawner.spawn(doorman(listener)?);
+    return Ok(());
+
+    #[embassy_executor::task(pool_size = MAX_CLIENTS)]
+    async fn worker(listener: &'static Listener, client: Client, house: &'static House) {
+        SERVER.work(listener, client, house).await;
+    }
+
+    #[embassy_executor::task]
+    async fn doorman(listener: &'static Listener) {
+        SERVER.turn_away(listener).await;
+    }
+}
+
+#[embassy_executor::task]
+async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
+    house.arm.tick(servos, frame).await;
+}
+
+#[embassy_executor::task]
+async fn storage(house: &'static House, memory: Memory<Flash>) {
+    house.store.run(memory).await;
+}
+
+/// An arm with what its flash remembers.
+fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<Flash>)> {
+    let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
+    let mut memory =
+        memory.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
+    let settings = embassy_futures::block_on(memory.load());
+    let house = House::new(data, settings, IDENTITY, VITALS);
+    Ok((Box::leak(Box::new(house)), memory))
+}
+
+/// Draws one file in virtual time.
+fn draw_file(options: Draw) -> io::Result<ExitCode> {
+    static FINISHED: AtomicBool = AtomicBool::new(false);
+    let bar = ProgressBar::new(0);
+    let style = ProgressStyle::with_template("{bar:40} {percent}% of {bytes_total}, {eta} left");
+    bar.set_style(style.map_err(io::Error::other)?);
+    let path = &options.file;
+    let script = draw::open(path, bar.clone());
+    let (script, answers, outcome) = script
+        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
+    let data = ArmData::default();
+    let outputs = Outputs {
+        trace: options.common.trace.clone(),
+        picture: options.picture.clone(),
+    };
+    let (recorder, servos) = Recorder::start(outputs, data, false)?;
+    let (house, memory) = house(data, FileFlash::in_memory())?;
+    let frame = options.common.frame();
+
+    // Nobody watches: time may always jump.
+    clock::hurry(true);
+    let mut spawned = Ok(());
+    let spawn = |spawner: Spawner| {
+        spawner.spawn(arm(house, servos, frame)?);
+        spawner.spawn(storage(house, memory)?);
+        spawner.spawn(client(script, answers, house)?);
+        Ok::<_, SpawnError>(())
+    };
+    clock::run(
+        Speed::Max,
+        |spawner| spawned = spawn(spawner),
+        || FINISHED.load(Ordering::Relaxed),
+    );
+    spawned.map_err(io::Error::other)?;
+    let totals = recorder.finish()?;
+    bar.finish_and_clear();
+    let outcome = *outcome.borrow();
+    tell(&outcome, &totals);
+    return Ok(if outcome.is_clean() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    });
+
+    #[embassy_executor::task]
+    async fn client(script: Script, answers: Answers, house: &'static House) {
+        if let Some(client) = Client::new(0) {
+            serve(script, answers, client, house).await;
+        }
+        while house.arm.with(|machine| machine.is_busy()) {
+            Timer::after_millis(1).await;
+        }
+        FINISHED.store(true, Ordering::Relaxed);
+    }
+}
+
+fn tell(outcome: &Outcome, totals: &Totals) {
+    let seconds = totals.moving.as_secs_f64();
+    println!("commands        {}", outcome.commands);
+    println!("errors          {}", outcome.errors);
+    println!("strokes         {}", totals.strokes);
+    println!("pen down        {:.1} mm", totals.pen_down_mm);
+    println!("pen up          {:.1} mm", totals.pen_up_mm);
+    println!("points limited  {}", outcome.limited);
+    println!(
+        "time of the arm {:.0} min {:.1} s",
+        (seconds / 60.0).floor(),
+        seconds % 60.0
+    );
+}

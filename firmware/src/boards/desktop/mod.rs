@@ -1,0 +1,33 @@
+//! The arm nobody needs hardware for: the firmware's tasks on a desktop, with real sockets, a file
+//! for flash, and a picture of what the servos did.
+
+pub mod canvas;
+pub mod clock;
+pub mod draw;
+pub mod flash;
+pub mod net;
+pub mod recorder;
+
+use crate::board::Vitals;
+use protocol_core::lineus::Identity;
+
+/// A made-up address of the kind that no maker has.
+pub const IDENTITY: Identity = Identity {
+    mac: [0x02, 0x51, 0x75, 0x69, 0x6c, 0x6c],
+};
+
+/// What a desktop knows about itself.
+pub const VITALS: Vitals = Vitals {
+    free_memory,
+    reset_reason: "program start",
+};
+
+/// Available memory in bytes where the system tells it, as far as 32 bits go; else 0.
+fn free_memory() -> u32 {
+    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let kilobytes = text
+        .lines()
+        .find_map(|line| line.strip_prefix("MemAvailable:"))
+        .and_then(|rest| rest.trim().trim_end_matches(" kB").parse::<u64>().ok());
+    u32::try_from(kilobytes.unwrap_or(0).saturating_mul(1024)).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,261 @@
+//! Line-us G-code over TCP: a pool of connections, one session each.
+//!
+//! Each of [`MAX_CLIENTS`] workers accepts, serves, and accepts again; when all are busy, the doorman
+//! takes the next client, says so, and closes. What a slow client loses is its own replies.
+
+use super::House;
+use crate::log::info;
+use core::fmt::Display;
+use core::sync::atomic::{AtomicU8, Ordering};
+use edge_nal::{Close, TcpAccept, TcpShutdown, TcpSplit};
+use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Instant, Timer, with_timeout};
+use embedded_io_async::{Read, Write};
+use protocol_core::lineus::{Diagnostics, MAX_REPLY, Reply, Request, Session};
+use protocol_core::machine::{Client, MAX_CLIENTS};
+use protocol_core::motion::{Micros, Steps};
+use protocol_core::settings::{MachineName, Setting};
+
+/// The port of Line-us.
+pub const PORT: u16 = 1337;
+/// Bytes taken from a socket at a time.
+const CHUNK: usize = 512;
+/// How long a reply may wait for a client that does not read. After that the reply is lost, and so are
+/// later ones, without a wait, until the client reads again: its commands are executed all the same.
+pub const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a client that is being turned away has to read why.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+/// The pool of connections.
+#[derive(Default)]
+pub struct Server {
+    busy: AtomicU8,
+    /// A worker became busy or free.
+    changed: Signal<CriticalSectionRawMutex, ()>,
+}
+
+impl Server {
+    /// With nobody connected.
+    pub const fn new() -> Self {
+        Self {
+            busy: AtomicU8::new(0),
+            changed: Signal::new(),
+        }
+    }
+
+    /// One worker of the pool: serves one client after the other, for ever.
+    pub async fn work<A: TcpAccept>(&self, acceptor: &A, client: Client, house: &House) -> ! {
+        loop {
+            let Ok((peer, mut socket)) = acceptor.accept().await else {
+                // Out of sockets, or a client that left before it was met: not at full speed, though.
+                Timer::after_millis(10).await;
+                continue;
+            };
+            self.count(1);
+            info!("client {} connected", peer);
+            {
+                let (reader, writer) = socket.split();
+                serve(reader, writer, client, house).await;
+            }
+            // It may be gone already; then there is nothing to close.
+            let _ = with_timeout(FAREWELL, socket.close(Close::Both)).await;
+            info!("client {} left", peer);
+            self.count(-1);
+        }
+    }
+
+    /// Tells clients that come when all workers are busy, and closes.
+    pub async fn turn_away<A: TcpAccept>(&self, acceptor: &A) -> ! {
+        loop {
+            if usize::from(self.busy.load(Ordering::Relaxed)) < MAX_CLIENTS {
+                self.changed.wait().await;
+                continue;
+            }
+            // A worker that becomes free meanwhile takes the client instead.
+            let accepted = select(acceptor.accept(), self.changed.wait()).await;
+            if let Either::First(Ok((peer, mut socket))) = accepted {
+                info!("client {} turned away: {} are connected", peer, MAX_CLIENTS);
+                // Whether it hears it is up to the client.
+                let _ = with_timeout(FAREWELL, farewell(&mut socket)).await;
+            }
+        }
+    }
+
+    fn count(&self, change: i8) {
+        // Workers share one executor: nobody comes in between.
+        let busy = self.busy.load(Ordering::Relaxed);
+        self.busy
+            .store(busy.saturating_add_signed(change), Ordering::Relaxed);
+        self.changed.signal(());
+    }
+}
+
+/// Tells why, and waits for the client to close: closed at once, what it has sent meanwhile would make
+/// its system throw the message away.
+async fn farewell<S: Read + Write + TcpShutdown>(socket: &mut S) -> Result<(), S::Error> {
+    let mut reply = Reply::new();
+    reply.error(format_args!(
+        "{MAX_CLIENTS} clients are connected already, no more fit"
+    ));
+    socket.write_all(reply.as_bytes()).await?;
+    socket.close(Close::Write).await?;
+    while socket.read(&mut [0; 64]).await? > 0 {}
+    Ok(())
+}
+
+/// Serves one connection until its client has closed it and everything received is executed.
+pub async fn serve(mut reader: impl Read, writer: impl Write, client: Client, house: &House) {
+    let mut session = Session::new();
+    let mut reply = Reply::new();
+    let mut answers = Answers::new(writer);
+    reply.hello(&house.name(), house.identity);
+    answers.send(&reply).await;
+    let mut chunk = [0; CHUNK];
+    while let Ok(length @ 1..) = reader.read(&mut chunk).await {
+        let mut input = chunk.get(..length).unwrap_or_default();
+        while let Some(request) = session.next_request(&mut input, &mut reply) {
+            perform(request, &mut reply, client, house).await;
+            answers.send(&reply).await;
+        }
+    }
+    house.arm.with(|machine| machine.client_gone(client));
+}
+
+/// Does what a line asks for, and puts the answer into `reply`.
+async fn perform(request: Request, reply: &mut Reply, client: Client, house: &House) {
+    let arm = &house.arm;
+    match request {
+        Request::Answered => {}
+        Request::Errand(errand) => reply.report(&arm.errand(client, errand).await),
+        Request::SetSpeed { pen_down, pen_up } => {
+            arm.with(|machine| {
+                let now = machine.steps();
+                machine.set_steps(Steps {
+                    pen_down: pen_down.unwrap_or(now.pen_down),
+                    pen_up: pen_up.unwrap_or(now.pen_up),
+                });
+            });
+            reply.ok();
+        }
+        Request::Position => reply.position(arm.with(|machine| machine.position())),
+        Request::Angles => reply.angles(arm.with(|machine| machine.angles())),
+        Request::Capabilities => reply.capabilities(&house.name()),
+        Request::Diagnostics => diagnose(reply, house),
+        Request::Name => reply.name(&house.name()),
+        Request::Rename(name) => rename(name, reply, client, house).await,
+        Request::Calibrate => calibrate(true, reply, client, house).await,
+        Request::ClearCalibration => calibrate(false, reply, client, house).await,
+    }
+}
+
+fn diagnose(reply: &mut Reply, house: &House) {
+    let (position, calibration) = house
+        .arm
+        .with(|machine| (machine.position(), machine.calibration()));
+    reply.diagnostics(&Diagnostics {
+        name: &house.name(),
+        identity: house.identity,
+        uptime: Micros::new(Instant::now().as_micros()),
+        position,
+        calibration,
+        free_memory: (house.vitals.free_memory)(),
+        reset_reason: house.vitals.reset_reason,
+    });
+}
+
+async fn rename(name: MachineName, reply: &mut Reply, client: Client, house: &House) {
+    let _rest = house.arm.rest(client).await;
+    match house.store.save(Setting::Name(name.clone())).await {
+        Ok(()) => {
+            reply.name(&name);
+            house.rename(name);
+        }
+        Err(error) => refuse_store("name", &error, reply),
+    }
+}
+
+/// Makes the place where the arm rests the calibration point, or removes the calibration.
+async fn calibrate(here: bool, reply: &mut Reply, client: Client, house: &House) {
+    let _rest = house.arm.rest(client).await;
+    let calibration = match here {
+        true => house.arm.with(|machine| machine.calibration_here()),
+        false => Default::default(),
+    };
+    match house.store.save(Setting::Calibration(calibration)).await {
+        Ok(()) => {
+            house
+                .arm
+                .with(|machine| machine.set_calibration(calibration));
+            reply.ok();
+        }
+        Err(error) => refuse_store("calibration", &error, reply),
+    }
+}
+
+fn refuse_store(what: &str, error: &dyn Display, reply: &mut Reply) {
+    reply.error(format_args!(
+        "the {what} is not stored and stays as it was: {error}"
+    ));
+}
+
+/// The way of replies to one client: whole, in order, each in one write as long as it reads.
+struct Answers<W> {
+    writer: W,
+    /// The rest of a reply of which only a part went out: it comes before anything else.
+    rest: heapless::Vec<u8, MAX_REPLY>,
+    /// The client does not read: no reply waits for it.
+    slow: bool,
+    /// The client cannot be written to any more.
+    gone: bool,
+}
+
+impl<W: Write> Answers<W> {
+    const fn new(writer: W) -> Self {
+        Self {
+            writer,
+            rest: heapless::Vec::new(),
+            slow: false,
+            gone: false,
+        }
+    }
+
+    async fn send(&mut self, reply: &Reply) {
+        let rest = core::mem::take(&mut self.rest);
+        let unsent = self.push(&rest).await;
+        if unsent > 0 {
+            self.keep(&rest, unsent);
+            return;
+        }
+        let message = reply.as_bytes();
+        let unsent = self.push(message).await;
+        if unsent < message.len() {
+            self.keep(message, unsent);
+        }
+    }
+
+    fn keep(&mut self, message: &[u8], unsent: usize) {
+        let tail = message.get(message.len() - unsent..).unwrap_or_default();
+        self.rest = heapless::Vec::from_slice(tail).unwrap_or_default();
+    }
+
+    /// Writes as much of `bytes` as the client takes in time, and gives how much is left.
+    async fn push(&mut self, mut bytes: &[u8]) -> usize {
+        while !bytes.is_empty() && !self.gone {
+            let patience = if self.slow { Duration::MIN } else { PATIENCE };
+            match with_timeout(patience, self.writer.write(bytes)).await {
+                Ok(Ok(written @ 1..)) => {
+                    bytes = bytes.get(written..).unwrap_or_default();
+                    self.slow = false;
+                }
+                Ok(_) => self.gone = true,
+                Err(_) => {
+                    self.slow = true;
+                    return bytes.len();
+                }
+            }
+        }
+        bytes.len()
+    }
+}

@@ -1,0 +1,12 @@
+//! Line-us G-code: typed commands, replies, one session for each connection
+//! (specification 1.0.4a with `reference/line-us.md`).
+
+mod command;
+mod refusal;
+mod reply;
+mod session;
+
+pub use command::{Command, parse};
+pub use refusal::Refusal;
+pub use reply::{Diagnostics, Identity, MAX_REPLY, Reply, TERMINATOR, VERSION};
+pub use session::{Request, Session};

@@ -1,0 +1,102 @@
+//! Why a line is refused, and the one place where that becomes text.
+
+use crate::settings::MAX_NAME;
+use crate::text::{LineError, MAX_LINE, WordError, excerpt};
+use core::fmt;
+
+/// Why a line is refused; nothing has changed then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal<'a> {
+    /// The bytes are no line.
+    Line(LineError),
+    /// The line is no words.
+    Words(WordError<'a>),
+    /// No such command.
+    UnknownCommand(&'a str),
+    /// A command that this firmware will know, but does not yet.
+    NotYet(u16),
+    /// A letter that the command does not have.
+    UnknownParameter(char),
+    /// A letter that came twice; F and S of G94 are the same.
+    Repeated(char),
+    /// A number that the parameter cannot have.
+    OutOfRange {
+        /// The parameter's letter.
+        letter: char,
+        /// Least value.
+        least: i32,
+        /// Largest value.
+        most: i32,
+    },
+    /// A scale of zero, or so near to it that it would be.
+    ZeroScale,
+    /// A text that the parameter cannot have, and what it may be.
+    BadText(char, &'a str, &'static str),
+    /// No machine name.
+    BadName(&'a str),
+}
+
+impl<'a> From<WordError<'a>> for Refusal<'a> {
+    fn from(error: WordError<'a>) -> Self {
+        Self::Words(error)
+    }
+}
+
+impl fmt::Display for Refusal<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Line(LineError::TooLong) => write!(out, "line longer than {MAX_LINE} bytes"),
+            Self::Line(LineError::NotUtf8) => out.write_str("line is not UTF-8 text"),
+            Self::Words(error) => words(error, out),
+            Self::UnknownCommand(text) => write!(out, "unknown command '{}'", excerpt(text)),
+            Self::NotYet(997) => {
+                out.write_str("M997 is missing: this firmware cannot update itself yet")
+            }
+            Self::NotYet(code) => write!(
+                out,
+                "M{code} is missing: this firmware has no WiFi commands yet"
+            ),
+            Self::UnknownParameter(letter) => write!(out, "unknown parameter {letter}"),
+            Self::Repeated(letter) => write!(out, "parameter {letter} is repeated"),
+            Self::OutOfRange {
+                letter,
+                least,
+                most,
+            } => {
+                write!(out, "{letter} is out of range, {least} to {most}")
+            }
+            Self::ZeroScale => out.write_str("S must not be zero"),
+            Self::BadText(letter, text, expected) => {
+                write!(out, "{letter} is '{}', it may be {expected}", excerpt(text))
+            }
+            Self::BadName(text) => write!(
+                out,
+                "P is '{}', a name is 1 to {MAX_NAME} letters, digits and inner hyphens",
+                excerpt(text)
+            ),
+        }
+    }
+}
+
+fn words(error: WordError<'_>, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match error {
+        WordError::OpenComment => out.write_str("comment without closing bracket"),
+        WordError::OpenQuote(letter) => write!(out, "{letter} has no closing quote"),
+        WordError::NoLetter(found) => {
+            let mut utf8 = [0; 4];
+            write!(
+                out,
+                "'{}' where a parameter letter should be",
+                excerpt(found.encode_utf8(&mut utf8))
+            )
+        }
+        WordError::NoNumber(letter) => write!(out, "{letter} has no number"),
+        WordError::NotANumber(letter, text) => {
+            write!(out, "{letter} is '{}', not a decimal number", excerpt(text))
+        }
+        WordError::NoValue(letter) => write!(out, "{letter} has no value"),
+        WordError::Value(letter, text) => {
+            write!(out, "{letter} takes no value, but has '{}'", excerpt(text))
+        }
+    }
+}

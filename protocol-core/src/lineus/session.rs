@@ -1,0 +1,378 @@
+//! One connection: its bytes become requests, one reply each, in order.
+
+use super::command::{Command, parse};
+use super::refusal::Refusal;
+use super::reply::Reply;
+use crate::machine::{Errand, Manner, Target};
+use crate::motion::{StepSize, Transform, WideCoordinate};
+use crate::settings::MachineName;
+use crate::text::LineBuffer;
+
+/// What a line asks for, in arm coordinates; each is answered by exactly one reply.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Nothing more to do: the reply has been written.
+    Answered,
+    /// To be answered by [`Reply::report`].
+    Errand(Errand),
+    /// To be answered by [`Reply::ok`].
+    SetSpeed {
+        /// Step with the pen down.
+        pen_down: Option<StepSize>,
+        /// Step with the pen up.
+        pen_up: Option<StepSize>,
+    },
+    /// To be answered by [`Reply::position`].
+    Position,
+    /// To be answered by [`Reply::angles`].
+    Angles,
+    /// To be answered by [`Reply::capabilities`].
+    Capabilities,
+    /// To be answered by [`Reply::diagnostics`].
+    Diagnostics,
+    /// Make the place where the arm rests the calibration point.
+    Calibrate,
+    /// Remove the calibration.
+    ClearCalibration,
+    /// To be answered by [`Reply::name`].
+    Name,
+    /// To be answered by [`Reply::name`].
+    Rename(MachineName),
+}
+
+/// What belongs to one connection: the line being received, scale and origin.
+#[derive(Debug)]
+pub struct Session {
+    lines: LineBuffer,
+    transform: Transform,
+}
+
+impl Default for Session {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Session {
+    /// A new connection: X0 Y0 S1.
+    pub const fn new() -> Self {
+        Self {
+            lines: LineBuffer::new(),
+            transform: Transform::IDENTITY,
+        }
+    }
+
+    /// Takes bytes off the front of `input` up to the end of the next line, and gives what it asks
+    /// for; `None` when `input` is used up first. Where the session can answer by itself, the reply is
+    /// in `reply`.
+    pub fn next_request(&mut self, input: &mut &[u8], reply: &mut Reply) -> Option<Request> {
+        let line = self.lines.next_line(input)?;
+        let command = match line.map_err(Refusal::Line).and_then(parse) {
+            Ok(command) => command,
+            Err(refusal) => {
+                reply.refuse(&refusal);
+                return Some(Request::Answered);
+            }
+        };
+        Some(match command {
+            Command::Move { manner, x, y, z } => {
+                let target = Target {
+                    x: x.map(|x| self.transform.x(x)),
+                    y: y.map(|y| self.transform.y(y)),
+                    z: z.map(WideCoordinate::from_bits),
+                };
+                Request::Errand(Errand::Move(manner, target))
+            }
+            Command::Home => Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
+            Command::Transform { x, y, scale } => {
+                match self.transform.with(x, y, scale) {
+                    Some(transform) => {
+                        self.transform = transform;
+                        reply.ok();
+                    }
+                    None => reply.refuse(&Refusal::ZeroScale),
+                }
+                Request::Answered
+            }
+            Command::Nothing => {
+                reply.ok();
+                Request::Answered
+            }
+            Command::Speed { pen_down, pen_up } => Request::SetSpeed { pen_down, pen_up },
+            Command::Position => Request::Position,
+            Command::Angles => Request::Angles,
+            Command::Capabilities => Request::Capabilities,
+            Command::Diagnostics => Request::Diagnostics,
+            Command::Calibrate => Request::Calibrate,
+            Command::ClearCalibration => Request::ClearCalibration,
+            Command::Name => Request::Name,
+            Command::Rename(name) => Request::Rename(name),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use proptest::prelude::*;
+    use std::string::{String, ToString};
+    use std::vec::Vec;
+
+    /// Every request of a stream with the reply the session wrote itself.
+    fn requests(session: &mut Session, stream: &[u8]) -> Vec<(Request, String)> {
+        let (mut input, mut reply, mut found) = (stream, Reply::new(), Vec::new());
+        while let Some(request) = session.next_request(&mut input, &mut reply) {
+            let answer = match request {
+                Request::Answered => reply.message().to_string(),
+                _ => String::new(),
+            };
+            found.push((request, answer));
+        }
+        found
+    }
+
+    fn only(line: &str) -> (Request, String) {
+        let stream = std::format!("{line}\n");
+        let mut found = requests(&mut Session::new(), stream.as_bytes());
+        assert_eq!(found.len(), 1, "{line:?}: {found:?}");
+        found.remove(0)
+    }
+
+    fn target(x: Option<f64>, y: Option<f64>, z: Option<f64>) -> Target {
+        let wide = |value: f64| WideCoordinate::from_bits((value * 65536.0).round() as i64);
+        Target {
+            x: x.map(wide),
+            y: y.map(wide),
+            z: z.map(wide),
+        }
+    }
+
+    fn straight(x: f64, y: f64, z: f64) -> Request {
+        Request::Errand(Errand::Move(
+            Manner::Straight,
+            target(Some(x), Some(y), Some(z)),
+        ))
+    }
+
+    #[test]
+    fn moves_as_clients_write_them() {
+        for line in [
+            "G01 X900 Y300 Z1",
+            "g01 x900 y300 z1",
+            "G1 X900 Y300 Z1",
+            "G01  X900 Y300  Z1 ",
+            "G01 X900.0000 Y3e2 Z1.0",
+            "G01 Z1 Y300 X900",
+            "G1X900Y300Z1",
+            "G01 X\"900\" Y\"300\" Z\"1\"",
+            "G01 X900 (to the right) Y300 Z1 ; done",
+            "G01 X900 Y300 Z1 F5000",
+            "\tG01\tX900\tY300\tZ1",
+        ] {
+            assert_eq!(only(line).0, straight(900.0, 300.0, 1.0), "{line}");
+        }
+        let rapid = Errand::Move(Manner::Rapid, target(Some(5.0), None, None));
+        assert_eq!(only("G0 X5").0, Request::Errand(rapid));
+        assert_eq!(only("G00 X5").0, Request::Errand(rapid));
+    }
+
+    #[test]
+    fn numbers_are_exact_decimals() {
+        let request = only("G01 X12.345 Y999.9999999 Z1.5e-07").0;
+        assert_eq!(request, straight(12.345, 999.9999999, 0.0));
+    }
+
+    #[test]
+    fn refusals_name_the_letter_and_the_reason() {
+        for (line, reason) in [
+            ("undefined", "unknown command 'undefined'"),
+            ("G2 X5", "unknown command 'G2'"),
+            ("M9999", "unknown command 'M9999'"),
+            ("G01 Q5", "unknown parameter Q"),
+            ("G01 X5 X6", "parameter X is repeated"),
+            ("G01 X5 F1 F2", "parameter F is repeated"),
+            ("G01 X", "X has no number"),
+            ("G01 X Y5", "X has no number"),
+            ("G01 Xnan", "X is 'nan', not a decimal number"),
+            ("G01 Yinf", "Y is 'inf', not a decimal number"),
+            ("G01 Y-inf", "Y is '-inf', not a decimal number"),
+            ("G01 X0x10", "X is '0x10', not a decimal number"),
+            ("G01 X1.2.3", "X is '1.2.3', not a decimal number"),
+            ("G01 Fx", "F is 'x', not a decimal number"),
+            ("G01 X1e30", "X is out of range, -1000000 to 1000000"),
+            ("G01 X100 200", "'2' where a parameter letter should be"),
+            ("G01 X5 (open", "comment without closing bracket"),
+            ("G28 X5", "unknown parameter X"),
+            ("G54 S0", "S must not be zero"),
+            ("G54 S1e-40", "S must not be zero"),
+            ("G54 Snan", "S is 'nan', not a decimal number"),
+            ("G54 S1e9", "S is out of range, -1000 to 1000"),
+            ("G54 Z5", "unknown parameter Z"),
+            ("G94 S0", "S is out of range, 1 to 30"),
+            ("G94 S31", "S is out of range, 1 to 30"),
+            ("G94 F30.1", "F is out of range, 1 to 30"),
+            ("G94 S-5", "S is out of range, 1 to 30"),
+            ("G94 P101", "P is out of range, 1 to 100"),
+            ("G94 S5 F5", "parameter F is repeated"),
+            ("M114 X", "unknown parameter X"),
+            ("M114 S5", "S takes no value, but has '5'"),
+            ("M115 S", "unknown parameter S"),
+            ("M122 S", "unknown parameter S"),
+            ("M374 S", "S has no value"),
+            ("M374 Sclean", "S is 'clean', it may be 'clear'"),
+            ("M374 Sclear Sclear", "parameter S is repeated"),
+            ("M550 P", "P has no value"),
+            (
+                "M550 P-x",
+                "P is '-x', a name is 1 to 32 letters, digits and inner hyphens",
+            ),
+            (
+                "M550 P\"a b\"",
+                "P is 'a b', a name is 1 to 32 letters, digits and inner hyphens",
+            ),
+            ("M550 P\"open", "P has no closing quote"),
+            (
+                "M587",
+                "M587 is missing: this firmware has no WiFi commands yet",
+            ),
+            (
+                "M588 S*",
+                "M588 is missing: this firmware has no WiFi commands yet",
+            ),
+            (
+                "M997",
+                "M997 is missing: this firmware cannot update itself yet",
+            ),
+        ] {
+            assert_eq!(
+                only(line),
+                (Request::Answered, std::format!("error INFO:\"{reason}\"")),
+                "{line}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_other_commands() {
+        for (line, request) in [
+            (
+                "G28",
+                Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
+            ),
+            (
+                "G28 ",
+                Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
+            ),
+            ("M114", Request::Position),
+            ("m114 s", Request::Angles),
+            ("M115", Request::Capabilities),
+            ("M122 ", Request::Diagnostics),
+            ("M374", Request::Calibrate),
+            ("M374 Sclear", Request::ClearCalibration),
+            ("m374 sCLEAR", Request::ClearCalibration),
+            ("M374 S\"clear\"", Request::ClearCalibration),
+            ("M550", Request::Name),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
+        }
+        let step = StepSize::from_units;
+        let speed = |pen_down, pen_up| Request::SetSpeed { pen_down, pen_up };
+        assert_eq!(only("G94 S3").0, speed(Some(step(3)), None));
+        assert_eq!(only("G94 F3").0, speed(Some(step(3)), None));
+        assert_eq!(only("G94 S1 P50").0, speed(Some(step(1)), Some(step(50))));
+        let name = MachineName::new("robs-lineus");
+        for line in ["M550 Probs-lineus", "M550 P\"robs-lineus\""] {
+            assert_eq!(
+                only(line).0,
+                name.clone().map_or(Request::Answered, Request::Rename),
+                "{line}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_line_of_comments_is_answered_ok() {
+        for line in ["; G28", "(G28)", " (a) (b) ; c"] {
+            assert_eq!(only(line), (Request::Answered, "ok ".to_string()), "{line}");
+        }
+    }
+
+    #[test]
+    fn g54_belongs_to_the_session_and_not_to_z_nor_home() {
+        let mut session = Session::new();
+        let stream = b"G54 X100 Y0 S2.5\nG01 X200 Y100 Z300\nG54 Y7\nG01 X2 Y2\nG28\n";
+        let found = requests(&mut session, stream);
+        assert_eq!(found[0], (Request::Answered, "ok ".to_string()));
+        assert_eq!(found[1].0, straight(600.0, 250.0, 300.0));
+        let second = Errand::Move(Manner::Straight, target(Some(105.0), Some(12.0), None));
+        assert_eq!(found[3].0, Request::Errand(second));
+        assert_eq!(
+            found[4].0,
+            Request::Errand(Errand::Move(Manner::Straight, Target::HOME))
+        );
+    }
+
+    #[test]
+    fn a_refused_g54_changes_nothing() {
+        let mut session = Session::new();
+        let found = requests(
+            &mut session,
+            b"G54 X100 S0\nG54 X50 Q1\nG54 X7 X8\nG01 X1 Y1 Z1\n",
+        );
+        assert_eq!(found[3].0, straight(1.0, 1.0, 1.0));
+    }
+
+    #[test]
+    fn the_longest_wifi_command_fits_a_line() {
+        let quotes = "\"\"";
+        let line = std::format!("M587 S\"{}\" P\"{}\"", quotes.repeat(32), quotes.repeat(63));
+        assert!(line.len() <= crate::text::MAX_LINE);
+        assert!(only(&line).1.contains("M587"));
+    }
+
+    /// Lines that are nearly right, where the mistakes hide.
+    fn nearly() -> impl Strategy<Value = String> {
+        let word = "[GMgmXYZSFPxyz][0-9.eE+\\-\"]{0,6}";
+        proptest::collection::vec(word, 0..6).prop_map(|words| words.join(" "))
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_get_one_reply_per_line_and_no_panic(stream: Vec<u8>) {
+            let lines = stream
+                .split(|byte| matches!(byte, b'\r' | b'\n' | 0))
+                .filter(|line| line.iter().any(|byte| !matches!(byte, b' ' | b'\t')));
+            let ended = stream.iter().rposition(|byte| matches!(byte, b'\r' | b'\n' | 0)).map_or(0, |at| at + 1);
+            let unfinished = stream[ended..].iter().any(|byte| !matches!(byte, b' ' | b'\t'));
+            let found = requests(&mut Session::new(), &stream);
+            prop_assert_eq!(found.len(), lines.count() - usize::from(unfinished));
+        }
+
+        #[test]
+        fn refused_lines_change_nothing(line in nearly()) {
+            let mut session = Session::new();
+            let before = session.transform;
+            let stream = std::format!("{line}\n");
+            for (_, answer) in requests(&mut session, stream.as_bytes()) {
+                if answer.starts_with("error") {
+                    prop_assert_eq!(session.transform, before, "{}", line);
+                }
+            }
+        }
+
+        #[test]
+        fn errors_are_one_quoted_text_below_256_bytes(text in "\\PC{0,300}") {
+            for line in [text.clone(), std::format!("G01 X{text}"), std::format!("M374 S{text}")] {
+                let stream = std::format!("{line}\n");
+                for (_, answer) in requests(&mut Session::new(), stream.as_bytes()) {
+                    if answer.starts_with("error") {
+                        prop_assert!(answer.len() < 253, "{}", answer);
+                        prop_assert_eq!(answer.matches('"').count(), 2, "{}", answer);
+                        prop_assert!(answer.starts_with("error INFO:\"") && answer.ends_with('"'));
+                    }
+                }
+            }
+        }
+    }
+}
