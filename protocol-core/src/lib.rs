@@ -10,7 +10,6 @@
 //! ```
 
 #![no_std]
-#![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod arm;
 pub mod lineus;

@@ -507,7 +507,6 @@ pub fn position_of(pulses: Pulses, data: &ArmData) -> Position {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

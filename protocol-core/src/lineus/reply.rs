@@ -257,7 +257,6 @@ impl fmt::Display for Uptime {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     extern crate std;
     use super::*;

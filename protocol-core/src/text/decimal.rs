@@ -152,7 +152,6 @@ fn read_exponent(text: &[u8]) -> Option<(i32, &[u8])> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     extern crate std;
     use super::*;

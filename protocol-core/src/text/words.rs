@@ -231,7 +231,6 @@ pub fn excerpt(text: &str) -> impl fmt::Display + '_ {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     extern crate std;
     use super::*;
