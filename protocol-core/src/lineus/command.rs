@@ -4,24 +4,15 @@ use super::refusal::Refusal;
 use crate::machine::Manner;
 use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
 use crate::settings::{MAX_NAME, MachineName};
-use crate::text::{Decimal, Words};
+use crate::text::Words;
 
 /// A valid command, its numbers as written: not yet scaled, not yet limited.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
     /// Comments and nothing else.
     Nothing,
-    /// G00, G01: coordinates in 1/65536 units, within +-[`MAX_COORDINATE`].
-    Move {
-        /// Straight or rapid.
-        manner: Manner,
-        /// X as written.
-        x: Option<i64>,
-        /// Y as written.
-        y: Option<i64>,
-        /// Z as written.
-        z: Option<i64>,
-    },
+    /// G00, G01.
+    Move(Manner, Axes),
     /// G28.
     Home,
     /// G54: offsets in 1/65536 units, scale in 1/2^32 and not zero.
@@ -58,21 +49,43 @@ pub enum Command {
     Rename(MachineName),
 }
 
+/// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
+/// absent.
+///
+/// Not three `Option`s, because commands are moved about and those are twice as large.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Axes {
+    values: [i64; 3],
+    /// A bit for each axis, in the order X, Y, Z; the bit after them is of no meaning.
+    given: u8,
+}
+
+impl Axes {
+    /// X, Y and Z.
+    pub fn to_array(self) -> [Option<i64>; 3] {
+        let [x, y, z] = self.values;
+        [(x, 1), (y, 2), (z, 4)].map(|(value, bit)| (self.given & bit != 0).then_some(value))
+    }
+}
+
 /// Reads one line.
 ///
 /// # Errors
 /// A [`Refusal`] that names what is wrong with it.
-pub fn parse(line: &str) -> Result<Command, Refusal<'_>> {
+#[inline]
+pub fn parse(line: &[u8]) -> Result<Command, Refusal<'_>> {
     let mut words = Words::new(line);
-    let code = match words.code() {
-        Ok(Some(code)) => code,
-        Ok(None) => return Ok(Command::Nothing),
-        Err(Ok(error)) => return Err(error.into()),
-        Err(Err(text)) => return Err(Refusal::UnknownCommand(text)),
+    let manner = match words.code()? {
+        None => return Ok(Command::Nothing),
+        Some((b'G', 1)) => Manner::Straight,
+        Some((b'G', 0)) => Manner::Rapid,
+        Some(code) => return other_than_a_move(code, words),
     };
+    a_move(words, manner)
+}
+
+fn other_than_a_move<'a>(code: (u8, u32), mut words: Words<'a>) -> Result<Command, Refusal<'a>> {
     match code {
-        (b'G', 1) => a_move(&mut words, Manner::Straight),
-        (b'G', 0) => a_move(&mut words, Manner::Rapid),
         (b'G', 28) => without_parameters(&mut words, Command::Home),
         (b'G', 54) => transform(&mut words),
         (b'G', 94) => speed(&mut words),
@@ -82,11 +95,7 @@ pub fn parse(line: &str) -> Result<Command, Refusal<'_>> {
         (b'M', 374) => calibration(&mut words),
         (b'M', 550) => name(&mut words),
         (b'M', code @ (587 | 588 | 997)) => Err(Refusal::NotYet(code)),
-        _ => {
-            let text = line.trim_start_matches([' ', '\t']);
-            let end = text.find([' ', '\t', ';', '(']).unwrap_or(text.len());
-            Err(Refusal::UnknownCommand(text.get(..end).unwrap_or(text)))
-        }
+        (letter, number) => Err(Refusal::UnknownCommand(letter.into(), number)),
     }
 }
 
@@ -95,6 +104,7 @@ pub fn parse(line: &str) -> Result<Command, Refusal<'_>> {
 struct Letters(u32);
 
 impl Letters {
+    #[inline(always)]
     fn once<'a>(&mut self, letter: char) -> Result<(), Refusal<'a>> {
         let bit = 1 << (u32::from(letter) & 31);
         if self.0 & bit != 0 {
@@ -105,23 +115,32 @@ impl Letters {
     }
 }
 
-fn a_move<'a>(words: &mut Words<'a>, manner: Manner) -> Result<Command, Refusal<'a>> {
-    let mut letters = Letters::default();
-    let (mut x, mut y, mut z) = (None, None, None);
+#[inline(always)]
+fn a_move<'a>(mut words: Words<'a>, manner: Manner) -> Result<Command, Refusal<'a>> {
+    let mut axes = Axes::default();
+    let mut seen = 0;
     while let Some(letter) = words.letter()? {
-        letters.once(letter)?;
-        match letter {
-            'X' => x = Some(coordinate(words, letter)?),
-            'Y' => y = Some(coordinate(words, letter)?),
-            'Z' => z = Some(coordinate(words, letter)?),
+        let (bit, value) = match letter {
+            'X' => (1, 0),
+            'Y' => (2, 1),
+            'Z' => (4, 2),
+            'F' => (8, 3),
+            _ => return Err(Refusal::UnknownParameter(letter)),
+        };
+        if seen & bit != 0 {
+            return Err(Refusal::Repeated(letter));
+        }
+        seen |= bit;
+        match axes.values.get_mut(value) {
+            Some(value) => *value = coordinate(&mut words, letter)?,
             // Feed rates of other machines: accepted, without a meaning here.
-            'F' => {
+            None => {
                 words.number(letter)?;
             }
-            _ => return Err(Refusal::UnknownParameter(letter)),
         }
     }
-    Ok(Command::Move { manner, x, y, z })
+    axes.given = seen;
+    Ok(Command::Move(manner, axes))
 }
 
 fn transform<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
@@ -133,12 +152,7 @@ fn transform<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
             'X' => x = Some(coordinate(words, letter)?),
             'Y' => y = Some(coordinate(words, letter)?),
             'S' => {
-                let factor = fixed(
-                    words.number(letter)?,
-                    letter,
-                    Transform::SCALE_BITS,
-                    MAX_SCALE,
-                )?;
+                let factor = fixed(words, letter, Transform::SCALE_BITS, MAX_SCALE)?;
                 if factor == 0 {
                     return Err(Refusal::ZeroScale);
                 }
@@ -222,13 +236,9 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
     }
 }
 
+#[inline(always)]
 fn coordinate<'a>(words: &mut Words<'a>, letter: char) -> Result<i64, Refusal<'a>> {
-    fixed(
-        words.number(letter)?,
-        letter,
-        Coordinate::FRACTION_BITS,
-        MAX_COORDINATE,
-    )
+    fixed(words, letter, Coordinate::FRACTION_BITS, MAX_COORDINATE)
 }
 
 fn step<'a>(
@@ -242,15 +252,20 @@ fn step<'a>(
         most: range.most.into(),
     };
     words
-        .number(letter)?
-        .to_fixed(Coordinate::FRACTION_BITS, range.most.into())
+        .fixed(letter, Coordinate::FRACTION_BITS, range.most.into())?
         .ok()
         .and_then(|bits| range.step(bits))
         .ok_or(out_of_range)
 }
 
-fn fixed<'a>(number: Decimal, letter: char, bits: u32, limit: u32) -> Result<i64, Refusal<'a>> {
-    number.to_fixed(bits, limit).map_err(|_| {
+#[inline(always)]
+fn fixed<'a>(
+    words: &mut Words<'a>,
+    letter: char,
+    bits: u32,
+    limit: u32,
+) -> Result<i64, Refusal<'a>> {
+    words.fixed(letter, bits, limit)?.map_err(|_| {
         let most = limit.cast_signed();
         Refusal::OutOfRange {
             letter,

@@ -1,20 +1,20 @@
 //! Why a line is refused, and the one place where that becomes text.
 
 use crate::settings::MAX_NAME;
-use crate::text::{LineError, MAX_LINE, WordError, excerpt};
+use crate::text::{MAX_LINE, TooLong, WordError, excerpt};
 use core::fmt;
 
 /// Why a line is refused; nothing has changed then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal<'a> {
-    /// The bytes are no line.
-    Line(LineError),
+    /// The line is too long.
+    TooLong,
     /// The line is no words.
     Words(WordError<'a>),
-    /// No such command.
-    UnknownCommand(&'a str),
+    /// No command with this letter and number.
+    UnknownCommand(char, u32),
     /// A command that this firmware will know, but does not yet.
-    NotYet(u16),
+    NotYet(u32),
     /// A letter that the command does not have.
     UnknownParameter(char),
     /// A letter that came twice; F and S of G94 are the same.
@@ -42,13 +42,20 @@ impl<'a> From<WordError<'a>> for Refusal<'a> {
     }
 }
 
+impl From<TooLong> for Refusal<'_> {
+    fn from(_: TooLong) -> Self {
+        Self::TooLong
+    }
+}
+
 impl fmt::Display for Refusal<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Line(LineError::TooLong) => write!(out, "line longer than {MAX_LINE} bytes"),
-            Self::Line(LineError::NotUtf8) => out.write_str("line is not UTF-8 text"),
+            Self::TooLong => write!(out, "line longer than {MAX_LINE} bytes"),
             Self::Words(error) => words(error, out),
-            Self::UnknownCommand(text) => write!(out, "unknown command '{}'", excerpt(text)),
+            Self::UnknownCommand(letter, number) => {
+                write!(out, "unknown command '{letter}{number}'")
+            }
             Self::NotYet(997) => {
                 out.write_str("M997 is missing: this firmware cannot update itself yet")
             }
@@ -80,6 +87,8 @@ impl fmt::Display for Refusal<'_> {
 
 fn words(error: WordError<'_>, out: &mut fmt::Formatter<'_>) -> fmt::Result {
     match error {
+        WordError::NotUtf8 => out.write_str("line is not UTF-8 text"),
+        WordError::NoCode(text) => write!(out, "unknown command '{}'", excerpt(text)),
         WordError::OpenComment => out.write_str("comment without closing bracket"),
         WordError::OpenQuote(letter) => write!(out, "{letter} has no closing quote"),
         WordError::NoLetter(found) => {

@@ -6,7 +6,7 @@ use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
 use crate::settings::MachineName;
 use core::fmt::{self, Write};
-use heapless::String;
+use heapless::Vec;
 
 /// Ends every message to a client, the greeting included.
 pub const TERMINATOR: &str = "\r\n\0";
@@ -53,7 +53,7 @@ pub struct Diagnostics<'a> {
 /// One message to a client.
 #[derive(Debug, Default)]
 pub struct Reply {
-    text: String<MAX_REPLY>,
+    text: Vec<u8, MAX_REPLY>,
     is_error: bool,
 }
 
@@ -61,19 +61,20 @@ impl Reply {
     /// An empty message.
     pub const fn new() -> Self {
         Self {
-            text: String::new(),
+            text: Vec::new(),
             is_error: false,
         }
     }
 
     /// The bytes to send, terminator included, in one write.
     pub fn as_bytes(&self) -> &[u8] {
-        self.text.as_bytes()
+        &self.text
     }
 
     /// The message without its terminator.
     pub fn message(&self) -> &str {
-        self.text.strip_suffix(TERMINATOR).unwrap_or(&self.text)
+        let message = self.text.strip_suffix(TERMINATOR.as_bytes());
+        core::str::from_utf8(message.unwrap_or(&self.text)).unwrap_or_default()
     }
 
     /// Whether it says that something was refused.
@@ -180,10 +181,12 @@ impl Reply {
         self.restart();
         // A message is far shorter than its buffer; were it not, it is cut, and ended nevertheless.
         if self.text.write_fmt(message).is_err() {
-            let keep = (0..=MAX_REPLY - TERMINATOR.len() - 1)
-                .rev()
-                .find(|&end| end <= self.text.len() && self.text.is_char_boundary(end));
-            self.text.truncate(keep.unwrap_or(0));
+            let most = MAX_REPLY - TERMINATOR.len() - 1;
+            let whole = match core::str::from_utf8(self.text.get(..most).unwrap_or(&self.text)) {
+                Ok(text) => text.len(),
+                Err(cut) => cut.valid_up_to(),
+            };
+            self.text.truncate(whole);
         }
         self.push(TERMINATOR);
     }
@@ -194,7 +197,7 @@ impl Reply {
     }
 
     fn push(&mut self, text: &str) {
-        let _ = self.text.push_str(text);
+        let _ = self.text.extend_from_slice(text.as_bytes());
     }
 
     /// A whole number, without the machinery of `fmt`: replies to moves are the busiest ones.
@@ -204,17 +207,17 @@ impl Reply {
         }
         let mut digits = [0u8; 10];
         let mut rest = value.unsigned_abs();
-        let mut length = 0;
-        for digit in digits.iter_mut().rev() {
+        let mut first = digits.len();
+        for (index, digit) in digits.iter_mut().enumerate().rev() {
             *digit = b'0' + (rest % 10) as u8;
-            length += 1;
+            first = index;
             rest /= 10;
             if rest == 0 {
                 break;
             }
         }
-        for digit in digits.iter().skip(digits.len() - length) {
-            let _ = self.text.push(char::from(*digit));
+        for digit in digits.iter().skip(first) {
+            let _ = self.text.push(*digit);
         }
     }
 }

@@ -67,7 +67,7 @@ impl Session {
     /// in `reply`.
     pub fn next_request(&mut self, input: &mut &[u8], reply: &mut Reply) -> Option<Request> {
         let line = self.lines.next_line(input)?;
-        let command = match line.map_err(Refusal::Line).and_then(parse) {
+        let command = match line.map_err(Refusal::from).and_then(parse) {
             Ok(command) => command,
             Err(refusal) => {
                 reply.refuse(&refusal);
@@ -75,7 +75,8 @@ impl Session {
             }
         };
         Some(match command {
-            Command::Move { manner, x, y, z } => {
+            Command::Move(manner, axes) => {
+                let [x, y, z] = axes.to_array();
                 let target = Target {
                     x: x.map(|x| self.transform.x(x)),
                     y: y.map(|y| self.transform.y(y)),
@@ -187,7 +188,8 @@ mod tests {
     fn refusals_name_the_letter_and_the_reason() {
         for (line, reason) in [
             ("undefined", "unknown command 'undefined'"),
-            ("G2 X5", "unknown command 'G2'"),
+            ("G02 X5", "unknown command 'G2'"),
+            ("G01.5 X5", "unknown command 'G01.5'"),
             ("M9999", "unknown command 'M9999'"),
             ("G01 Q5", "unknown parameter Q"),
             ("G01 X5 X6", "parameter X is repeated"),
@@ -295,6 +297,31 @@ mod tests {
     fn a_line_of_comments_is_answered_ok() {
         for line in ["; G28", "(G28)", " (a) (b) ; c"] {
             assert_eq!(only(line), (Request::Answered, "ok ".to_string()), "{line}");
+        }
+    }
+
+    #[test]
+    fn bytes_that_are_not_utf8_spoil_their_line_alone() {
+        for line in [
+            &b"\xff\xfe"[..],
+            b"G01 X\xff",
+            b"G28 \xc3",
+            b"M550 P\xff",
+            b"M550 P\"\xff\"",
+            b"G28 ; \xff",
+            b"G01 (\xff) X5",
+        ] {
+            let stream = [line, b"\nM114\n"].concat();
+            let found = requests(&mut Session::new(), &stream);
+            let refused = (
+                Request::Answered,
+                "error INFO:\"line is not UTF-8 text\"".to_string(),
+            );
+            assert_eq!(
+                found,
+                [refused, (Request::Position, String::new())],
+                "{line:?}"
+            );
         }
     }
 

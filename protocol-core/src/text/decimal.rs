@@ -24,34 +24,13 @@ impl Decimal {
     /// Reads a number from the front of `text`; gives it with the rest, `None` where no number
     /// begins.
     pub(crate) fn read(text: &[u8]) -> Option<(Self, &[u8])> {
-        let (negative, mut rest) = match text {
-            [b'-', rest @ ..] => (true, rest),
-            [b'+', rest @ ..] => (false, rest),
-            _ => (false, text),
-        };
-        // Up to nine digits fit 32 bits, which is what nearly every number needs and what the
-        // chip multiplies in one instruction.
-        let mut short: u32 = 0;
-        let mut digits = 0;
-        while let [digit @ b'0'..=b'9', tail @ ..] = rest {
-            if digits == 9 {
-                break;
-            }
-            short = short * 10 + u32::from(digit - b'0');
-            digits += 1;
-            rest = tail;
-        }
+        let (negative, mut rest) = signed(text);
         let mut number = Self {
             negative,
-            mantissa: u64::from(short),
+            mantissa: 0,
             exponent: 0,
         };
-        if digits > 0 && !matches!(rest, [b'0'..=b'9' | b'.' | b'e' | b'E', ..]) {
-            return Some((number, rest));
-        }
-        let mut any = digits > 0;
-        let mut kept = if short == 0 { 0 } else { digits };
-        let mut after_point = false;
+        let (mut any, mut kept, mut after_point) = (false, 0, false);
         loop {
             match rest {
                 [digit @ b'0'..=b'9', tail @ ..] => {
@@ -89,15 +68,11 @@ impl Decimal {
     ///
     /// # Errors
     /// [`OutOfRange`] when the magnitude is more than `limit` (given in whole units).
+    #[cold]
     pub fn to_fixed(self, fraction_bits: u32, limit: u32) -> Result<i64, OutOfRange> {
-        let magnitude = if self.exponent == 0 {
-            if self.mantissa > u64::from(limit) {
-                return Err(OutOfRange);
-            }
-            self.mantissa << fraction_bits
-        } else if self.mantissa == 0 {
+        let magnitude = if self.mantissa == 0 {
             0
-        } else if self.exponent > 0 {
+        } else if self.exponent >= 0 {
             let whole = u32::try_from(self.exponent)
                 .ok()
                 .and_then(|exponent| 10u64.checked_pow(exponent))
@@ -135,13 +110,17 @@ fn scale_down(mantissa: u64, bits: u32, power: u64, limit: u32) -> Result<u64, O
     Ok((whole << bits) + fraction)
 }
 
-/// The exponent after an `e`, `None` when no digit follows it: then the `e` is no exponent.
-fn read_exponent(text: &[u8]) -> Option<(i32, &[u8])> {
-    let (negative, mut rest) = match text {
+fn signed(text: &[u8]) -> (bool, &[u8]) {
+    match text {
         [b'-', rest @ ..] => (true, rest),
         [b'+', rest @ ..] => (false, rest),
         _ => (false, text),
-    };
+    }
+}
+
+/// The exponent after an `e`, `None` when no digit follows it: then the `e` is no exponent.
+fn read_exponent(text: &[u8]) -> Option<(i32, &[u8])> {
+    let (negative, mut rest) = signed(text);
     let mut value = None;
     while let [digit @ b'0'..=b'9', tail @ ..] = rest {
         let next = value.unwrap_or(0) * 10 + i32::from(digit - b'0');

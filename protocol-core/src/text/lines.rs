@@ -12,14 +12,9 @@ use heapless::Vec;
 /// for blanks and a comment. A longer line is dropped whole and answered with one error.
 pub const MAX_LINE: usize = 256;
 
-/// Why a line cannot be read.
+/// More than [`MAX_LINE`] bytes came before the terminator; the whole line is dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LineError {
-    /// More than [`MAX_LINE`] bytes came before the terminator; the whole line is dropped.
-    TooLong,
-    /// The bytes are not UTF-8.
-    NotUtf8,
-}
+pub struct TooLong;
 
 /// Collects bytes until a line is complete.
 #[derive(Debug, Default)]
@@ -31,7 +26,12 @@ pub struct LineBuffer {
 }
 
 const fn ends_line(byte: u8) -> bool {
-    matches!(byte, b'\r' | b'\n' | 0)
+    // Nearly every byte is past all three, and needs one comparison.
+    byte <= b'\r' && matches!(byte, b'\r' | b'\n' | 0)
+}
+
+fn is_blank(line: &[u8]) -> bool {
+    line.iter().all(|&byte| matches!(byte, b' ' | b'\t'))
 }
 
 impl LineBuffer {
@@ -45,8 +45,11 @@ impl LineBuffer {
     }
 
     /// Takes bytes off the front of `input` up to the end of the next line that is not empty, and
-    /// gives that line; `None` when `input` is used up first.
-    pub fn next_line(&mut self, input: &mut &[u8]) -> Option<Result<&str, LineError>> {
+    /// gives that line; `None` when `input` is used up first. A line that came whole is not copied.
+    pub fn next_line<'l, 'i: 'l>(
+        &'l mut self,
+        input: &mut &'i [u8],
+    ) -> Option<Result<&'l [u8], TooLong>> {
         if self.handed_out {
             self.restart();
         }
@@ -57,18 +60,25 @@ impl LineBuffer {
                 return None;
             };
             let (line, rest) = input.split_at(end);
-            self.collect(line);
             *input = rest.get(1..).unwrap_or_default();
-            if self.too_long || !self.is_blank() {
+            if self.bytes.is_empty() && !self.too_long && line.len() <= MAX_LINE {
+                if is_blank(line) {
+                    continue;
+                }
+                return Some(Ok(line));
+            }
+            self.collect(line);
+            if self.too_long || !is_blank(&self.bytes) {
                 break;
             }
             self.restart();
         }
         self.handed_out = true;
-        if self.too_long {
-            return Some(Err(LineError::TooLong));
-        }
-        Some(core::str::from_utf8(&self.bytes).map_err(|_| LineError::NotUtf8))
+        Some(if self.too_long {
+            Err(TooLong)
+        } else {
+            Ok(&self.bytes)
+        })
     }
 
     fn collect(&mut self, part: &[u8]) {
@@ -82,10 +92,6 @@ impl LineBuffer {
         self.too_long = false;
         self.handed_out = false;
     }
-
-    fn is_blank(&self) -> bool {
-        self.bytes.iter().all(|&byte| matches!(byte, b' ' | b'\t'))
-    }
 }
 
 #[cfg(test)]
@@ -95,13 +101,13 @@ mod tests {
     use proptest::prelude::*;
     use std::{string::String, vec::Vec};
 
-    fn lines(chunks: &[&[u8]]) -> Vec<Result<String, LineError>> {
+    fn lines(chunks: &[&[u8]]) -> Vec<Result<String, TooLong>> {
         let mut buffer = LineBuffer::new();
         let mut found = Vec::new();
         for chunk in chunks {
             let mut input = *chunk;
             while let Some(line) = buffer.next_line(&mut input) {
-                found.push(line.map(String::from));
+                found.push(line.map(|line| String::from_utf8_lossy(line).into_owned()));
             }
         }
         found
@@ -127,7 +133,7 @@ mod tests {
         let stream = std::format!("{longest}\n{longest}y\nG28\n");
         assert_eq!(
             lines(&[stream.as_bytes()]),
-            [Ok(longest), Err(LineError::TooLong), Ok("G28".into())]
+            [Ok(longest), Err(TooLong), Ok("G28".into())]
         );
     }
 
@@ -136,15 +142,7 @@ mod tests {
         let part = [b'x'; 200];
         assert_eq!(
             lines(&[&part, &part, &part, b"\nM114\n"]),
-            [Err(LineError::TooLong), Ok("M114".into())]
-        );
-    }
-
-    #[test]
-    fn bytes_that_are_not_utf8_spoil_their_line_alone() {
-        assert_eq!(
-            lines(&[b"G28\n\xff\xfe\nM114\n"]),
-            [Ok("G28".into()), Err(LineError::NotUtf8), Ok("M114".into())]
+            [Err(TooLong), Ok("M114".into())]
         );
     }
 

@@ -6,5 +6,5 @@ mod lines;
 mod words;
 
 pub use decimal::{Decimal, OutOfRange};
-pub use lines::{LineBuffer, LineError, MAX_LINE};
+pub use lines::{LineBuffer, MAX_LINE, TooLong};
 pub use words::{MAX_EXCERPT, Text, WordError, Words, excerpt};

@@ -5,13 +5,17 @@
 //! written twice, `P"say ""hi"""`, in both directions. Blanks between a number and the next letter
 //! may be left out, `G1X100Y200`.
 
-use super::decimal::Decimal;
+use super::decimal::{Decimal, OutOfRange};
 use core::fmt;
 use heapless::String;
 
 /// What is wrong with the form of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WordError<'a> {
+    /// Bytes that are not UTF-8.
+    NotUtf8,
+    /// What should be a command's code is something else.
+    NoCode(&'a str),
     /// A `(` without its `)`.
     OpenComment,
     /// A quoted value that does not end.
@@ -61,146 +65,231 @@ impl<'a> Text<'a> {
 }
 
 /// Reads the words of one line from front to back.
+///
+/// On bytes, because a command of letters and numbers needs no more: that the line is UTF-8 is checked
+/// where something else is met. What is rare is a function of its own that is given the rest of the
+/// line and gives it back, so that the common way stays in registers.
 #[derive(Clone, Copy, Debug)]
 pub struct Words<'a> {
-    rest: &'a str,
+    rest: &'a [u8],
 }
 
 impl<'a> Words<'a> {
     /// The words of `line`.
-    pub const fn new(line: &'a str) -> Self {
+    pub const fn new(line: &'a [u8]) -> Self {
         Self { rest: line }
     }
 
-    /// The command's code: a letter in upper case and a number, `('G', 1)` for `g01`.
-    /// `Ok(None)` for a line of comments only; `Err(Err(text))` for what is no code.
-    pub fn code(&mut self) -> Result<Option<(u8, u16)>, Result<WordError<'a>, &'a str>> {
-        self.skip_blanks().map_err(Ok)?;
-        let bytes = self.rest.as_bytes();
-        let Some((letter, digits)) = bytes.split_first() else {
+    /// The command's code: a letter in upper case and a number, `('G', 1)` for `g01`; `None` for a
+    /// line of comments only.
+    ///
+    /// # Errors
+    /// [`WordError::NoCode`] with what is there instead.
+    #[inline(always)]
+    pub fn code(&mut self) -> Result<Option<(u8, u32)>, WordError<'a>> {
+        let mut start = skip_blanks(self.rest);
+        while let [b'\t' | b';' | b'(', ..] = start {
+            start = after_comments(start)?;
+        }
+        if start.is_empty() {
             return Ok(None);
-        };
-        let mut number: u16 = 0;
-        let mut length = 1;
-        for digit in digits {
-            if !digit.is_ascii_digit() || length > 4 {
-                break;
+        }
+        if let [letter, digits @ ..] = start
+            && let Some(letter) = upper_case(*letter)
+        {
+            let (number, length, rest) = short_number(digits);
+            let plain = matches!(rest, [] | [b' ', ..]) || ends_number(rest);
+            if (1..=MAX_CODE_DIGITS).contains(&length) && plain {
+                self.rest = rest;
+                return Ok(Some((letter, number)));
             }
-            number = number * 10 + u16::from(digit - b'0');
-            length += 1;
         }
-        let followed_by_word = match bytes.get(length) {
-            None => true,
-            Some(&next) => ends_value(next) || next.is_ascii_alphabetic(),
-        };
-        if !letter.is_ascii_alphabetic() || length == 1 || !followed_by_word {
-            return Err(Err(self.token()));
-        }
-        self.rest = self.rest.get(length..).unwrap_or_default();
-        Ok(Some((letter.to_ascii_uppercase(), number)))
+        Err(token(start).map_or(WordError::NotUtf8, WordError::NoCode))
     }
 
     /// The next parameter's letter in upper case, `None` at the end of the line.
+    #[inline(always)]
     pub fn letter(&mut self) -> Result<Option<char>, WordError<'a>> {
-        self.skip_blanks()?;
-        let Some(first) = self.rest.chars().next() else {
-            return Ok(None);
-        };
-        if !first.is_ascii_alphabetic() {
-            return Err(WordError::NoLetter(first));
+        let mut start = skip_blanks(self.rest);
+        loop {
+            match start {
+                [] => return Ok(None),
+                [letter, rest @ ..] => {
+                    if let Some(letter) = upper_case(*letter) {
+                        self.rest = rest;
+                        return Ok(Some(char::from(letter)));
+                    }
+                }
+            }
+            start = after_comments(start)?;
         }
-        self.rest = self.rest.get(1..).unwrap_or_default();
-        Ok(Some(first.to_ascii_uppercase()))
     }
 
     /// The number after `letter`, quoted or not.
+    #[inline(always)]
     pub fn number(&mut self, letter: char) -> Result<Decimal, WordError<'a>> {
-        let quoted = self.rest.starts_with('"');
-        let value = match quoted {
-            true => self.rest.get(1..).unwrap_or_default(),
-            false => self.rest,
+        let (number, rest) = any_number(self.rest, letter)?;
+        self.rest = rest;
+        Ok(number)
+    }
+
+    /// The number after `letter` as [`Decimal::to_fixed`] gives it.
+    #[inline(always)]
+    pub fn fixed(
+        &mut self,
+        letter: char,
+        bits: u32,
+        limit: u32,
+    ) -> Result<Result<i64, OutOfRange>, WordError<'a>> {
+        // Whole numbers in 32 bits, which is what the chip is quick at; everything else goes around.
+        let (negative, digits) = match self.rest {
+            [b'-', digits @ ..] => (true, digits),
+            digits => (false, digits),
         };
-        if let Some((number, left)) = Decimal::read(value.as_bytes()) {
-            let left = value.get(value.len() - left.len()..).unwrap_or_default();
-            match left.as_bytes().first() {
-                Some(b'"') if quoted => {
-                    self.rest = left.get(1..).unwrap_or_default();
-                    return Ok(number);
-                }
-                // `0x10` would otherwise read as zero and a parameter X.
-                Some(b'x' | b'X') if value.as_bytes().first() == Some(&b'0') => {}
-                next if !quoted
-                    && next.is_none_or(|&next| ends_value(next) || next.is_ascii_alphabetic()) =>
-                {
-                    self.rest = left;
-                    return Ok(number);
-                }
-                _ => {}
-            }
+        let (number, length, rest) = short_number(digits);
+        let short = (1..=MAX_SHORT_DIGITS).contains(&length) && matches!(rest, [] | [b' ', ..]);
+        if !short || number > limit {
+            let (number, rest) = any_number(self.rest, letter)?;
+            self.rest = rest;
+            return Ok(number.to_fixed(bits, limit));
         }
-        match self.token() {
-            "" | "\"\"" => Err(WordError::NoNumber(letter)),
-            token => Err(WordError::NotANumber(letter, token)),
-        }
+        self.rest = rest;
+        let magnitude = i64::from(number) << bits;
+        Ok(Ok(if negative { -magnitude } else { magnitude }))
     }
 
     /// The text after `letter`, quoted or up to the next blank or comment.
     pub fn text(&mut self, letter: char) -> Result<Text<'a>, WordError<'a>> {
-        if let Some(inner) = self.rest.strip_prefix('"') {
-            let mut bytes = inner.bytes().enumerate().peekable();
-            while let Some((at, byte)) = bytes.next() {
-                if byte != b'"' {
-                    continue;
-                }
-                if bytes.next_if(|&(_, next)| next == b'"').is_none() {
-                    let (raw, rest) = inner.split_at(at);
-                    self.rest = rest.get(1..).unwrap_or_default();
-                    return Ok(Text { raw, quoted: true });
-                }
+        let [b'"', inner @ ..] = self.rest else {
+            let raw = token(self.rest).ok_or(WordError::NotUtf8)?;
+            if raw.is_empty() {
+                return Err(WordError::NoValue(letter));
             }
-            return Err(WordError::OpenQuote(letter));
+            self.rest = self.rest.get(raw.len()..).unwrap_or_default();
+            return Ok(Text { raw, quoted: false });
+        };
+        let mut bytes = inner.iter().enumerate().peekable();
+        while let Some((at, byte)) = bytes.next() {
+            if *byte == b'"' && bytes.next_if(|(_, next)| **next == b'"').is_none() {
+                let (raw, rest) = inner.split_at(at);
+                self.rest = rest.get(1..).unwrap_or_default();
+                let raw = str::from_utf8(raw).map_err(|_| WordError::NotUtf8)?;
+                return Ok(Text { raw, quoted: true });
+            }
         }
-        let raw = self.token();
-        if raw.is_empty() {
-            return Err(WordError::NoValue(letter));
-        }
-        self.rest = self.rest.get(raw.len()..).unwrap_or_default();
-        Ok(Text { raw, quoted: false })
+        Err(WordError::OpenQuote(letter))
     }
 
     /// Nothing may follow `letter`.
     pub fn no_value(&mut self, letter: char) -> Result<(), WordError<'a>> {
-        match self.token() {
-            "" => Ok(()),
-            token => Err(WordError::Value(letter, token)),
-        }
-    }
-
-    /// What comes up to the next blank or comment.
-    fn token(&self) -> &'a str {
-        let end = self.rest.bytes().position(ends_value);
-        self.rest
-            .get(..end.unwrap_or(self.rest.len()))
-            .unwrap_or_default()
-    }
-
-    fn skip_blanks(&mut self) -> Result<(), WordError<'a>> {
-        loop {
-            match self.rest.as_bytes().first() {
-                Some(b' ' | b'\t') => self.rest = self.rest.get(1..).unwrap_or_default(),
-                Some(b';') => self.rest = "",
-                Some(b'(') => match self.rest.split_once(')') {
-                    Some((_, after)) => self.rest = after,
-                    None => return Err(WordError::OpenComment),
-                },
-                _ => return Ok(()),
-            }
+        match token(self.rest) {
+            Some("") => Ok(()),
+            Some(text) => Err(WordError::Value(letter, text)),
+            None => Err(WordError::NotUtf8),
         }
     }
 }
 
-const fn ends_value(byte: u8) -> bool {
+/// What comes after blanks; tabs are rare enough to pass for comments.
+#[inline(always)]
+fn skip_blanks(mut rest: &[u8]) -> &[u8] {
+    while let [b' ', after @ ..] = rest {
+        rest = after;
+    }
+    rest
+}
+
+/// The letter in upper case, `None` for any other byte.
+#[inline(always)]
+const fn upper_case(byte: u8) -> Option<u8> {
+    let upper = byte & !0x20;
+    if upper.is_ascii_uppercase() {
+        Some(upper)
+    } else {
+        None
+    }
+}
+
+/// Any number that is not short.
+#[cold]
+fn any_number(value: &[u8], letter: char) -> Result<(Decimal, &[u8]), WordError<'_>> {
+    let (quoted, inner) = match value {
+        [b'"', inner @ ..] => (true, inner),
+        inner => (false, inner),
+    };
+    match (Decimal::read(inner), quoted) {
+        (Some((number, [b'"', rest @ ..])), true) => return Ok((number, rest)),
+        // `0x10` would otherwise read as zero and a parameter X.
+        (Some((_, [b'x' | b'X', ..])), _) if inner.first() == Some(&b'0') => {}
+        (Some((number, rest)), false) if ends_number(rest) => return Ok((number, rest)),
+        _ => {}
+    }
+    Err(match token(value) {
+        None => WordError::NotUtf8,
+        Some("" | "\"\"") => WordError::NoNumber(letter),
+        Some(text) => WordError::NotANumber(letter, text),
+    })
+}
+
+/// What comes after comments.
+///
+/// # Errors
+/// [`WordError::NoLetter`] when there is no comment.
+#[cold]
+fn after_comments(rest: &[u8]) -> Result<&[u8], WordError<'_>> {
+    let text = str::from_utf8(rest).map_err(|_| WordError::NotUtf8)?;
+    let after = match text.as_bytes() {
+        [b'\t', ..] => text.trim_start_matches('\t'),
+        [b';', ..] => "",
+        [b'(', ..] => text.split_once(')').ok_or(WordError::OpenComment)?.1,
+        _ => return Err(WordError::NoLetter(text.chars().next().unwrap_or(' '))),
+    };
+    Ok(skip_blanks(after.as_bytes()))
+}
+
+/// What comes up to the next blank or comment, `None` if it is not UTF-8.
+#[cold]
+fn token(rest: &[u8]) -> Option<&str> {
+    let end = rest
+        .iter()
+        .position(|&byte| separates(byte))
+        .unwrap_or(rest.len());
+    str::from_utf8(rest.get(..end)?).ok()
+}
+
+/// Digits at the front of `text`: their value, which is right for up to [`MAX_SHORT_DIGITS`], how many
+/// there are, and what follows.
+#[inline(always)]
+fn short_number(text: &[u8]) -> (u32, usize, &[u8]) {
+    let (mut number, mut rest) = (0u32, text.iter());
+    while let Some(digit) = rest.as_slice().first() {
+        let digit = u32::from(*digit).wrapping_sub(u32::from(b'0'));
+        if digit > 9 {
+            break;
+        }
+        number = number.wrapping_mul(10).wrapping_add(digit);
+        rest.next();
+    }
+    let rest = rest.as_slice();
+    (number, text.len() - rest.len(), rest)
+}
+
+/// Digits that fit 32 bits.
+const MAX_SHORT_DIGITS: usize = 9;
+/// Longest number of a code, in digits.
+const MAX_CODE_DIGITS: usize = 4;
+
+const fn separates(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b';' | b'(')
+}
+
+/// A number may also be followed by the next letter at once.
+#[cold]
+const fn ends_number(rest: &[u8]) -> bool {
+    match rest {
+        [] => true,
+        [next, ..] => separates(*next) || next.is_ascii_alphabetic(),
+    }
 }
 
 /// Longest piece of a client's own text that a message repeats, in characters.
@@ -238,8 +327,8 @@ mod tests {
     use std::format;
     use std::string::String as StdString;
 
-    fn code(line: &str) -> Option<(u8, u16)> {
-        Words::new(line).code().unwrap()
+    fn code(line: &str) -> Option<(u8, u32)> {
+        Words::new(line.as_bytes()).code().unwrap()
     }
 
     #[test]
@@ -277,7 +366,11 @@ mod tests {
             ("42", "42"),
             ("\u{e9}1", "\u{e9}1"),
         ] {
-            assert_eq!(Words::new(line).code(), Err(Err(token)), "{line}");
+            assert_eq!(
+                Words::new(line.as_bytes()).code(),
+                Err(WordError::NoCode(token)),
+                "{line}"
+            );
         }
     }
 
@@ -291,7 +384,7 @@ mod tests {
             "X1(a)Y2;b",
             "X1.0\tY2.",
         ] {
-            let mut words = Words::new(line);
+            let mut words = Words::new(line.as_bytes());
             for (letter, value) in [('X', 1), ('Y', 2)] {
                 assert_eq!(words.letter(), Ok(Some(letter)), "{line}");
                 assert_eq!(
@@ -311,13 +404,13 @@ mod tests {
             "\u{b2}",
         ] {
             assert_eq!(
-                Words::new(value).number('X'),
+                Words::new(value.as_bytes()).number('X'),
                 Err(WordError::NotANumber('X', value)),
                 "{value}"
             );
         }
-        assert_eq!(Words::new("").number('X'), Err(WordError::NoNumber('X')));
-        assert_eq!(Words::new(" 5").number('X'), Err(WordError::NoNumber('X')));
+        assert_eq!(Words::new(b"").number('X'), Err(WordError::NoNumber('X')));
+        assert_eq!(Words::new(b" 5").number('X'), Err(WordError::NoNumber('X')));
     }
 
     #[test]
@@ -330,20 +423,20 @@ mod tests {
             ("\"\"", ""),
             ("*;all", "*"),
         ] {
-            let text = Words::new(value).text('S').unwrap();
+            let text = Words::new(value.as_bytes()).text('S').unwrap();
             assert_eq!(text.unescape::<64>().unwrap(), meaning, "{value}");
         }
         assert_eq!(
-            Words::new("\"open").text('S'),
+            Words::new(b"\"open").text('S'),
             Err(WordError::OpenQuote('S'))
         );
-        assert_eq!(Words::new(" x").text('S'), Err(WordError::NoValue('S')));
+        assert_eq!(Words::new(b" x").text('S'), Err(WordError::NoValue('S')));
     }
 
     #[test]
     fn an_unclosed_comment_is_an_error() {
-        assert_eq!(Words::new("G1 (oops").code(), Ok(Some((b'G', 1))));
-        let mut words = Words::new(" (oops");
+        assert_eq!(Words::new(b"G1 (oops").code(), Ok(Some((b'G', 1))));
+        let mut words = Words::new(b" (oops");
         assert_eq!(words.letter(), Err(WordError::OpenComment));
     }
 
@@ -351,7 +444,7 @@ mod tests {
         #[test]
         fn quoting_and_unquoting_is_the_identity(value in "\\PC{0,32}") {
             let written = format!("\"{}\"", value.replace('"', "\"\""));
-            let text = Words::new(&written).text('S').unwrap();
+            let text = Words::new(written.as_bytes()).text('S').unwrap();
             let read = text.unescape::<256>().unwrap();
             prop_assert_eq!(read.as_str(), value);
         }
