@@ -1,10 +1,12 @@
 //! What a board brings where the ecosystem has no trait for it.
 //!
-//! Network: edge-nal's `TcpAccept`. Memory: embedded-storage-async's `NorFlash`. Time: an
-//! embassy-time driver. The rest is here.
+//! Network: edge-nal's `TcpAccept` and `UdpBind`. Memory: embedded-storage-async's `NorFlash`. Button:
+//! embedded-hal-async's `Wait`. Time: an embassy-time driver. The rest is here.
 
+use heapless::Vec;
 use protocol_core::machine::SetPoint;
 use protocol_core::motion::Micros;
+use protocol_core::wifi::{Heard, Joined, Network};
 
 /// The three servos.
 pub trait Servos {
@@ -14,6 +16,93 @@ pub trait Servos {
     fn write(&mut self, time: Micros, set_point: &SetPoint);
 }
 
+/// When the servos begin a new frame.
+#[expect(
+    async_fn_in_trait,
+    reason = "awaited in place by the servo tick alone, so no bound is missing"
+)]
+pub trait Frames {
+    /// Waits for the next frame.
+    async fn next(&mut self);
+}
+
+/// A colour of the light, each part 0 (off) to 255.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Colour {
+    /// Red.
+    pub red: u8,
+    /// Green.
+    pub green: u8,
+    /// Blue.
+    pub blue: u8,
+}
+
+/// The light.
+pub trait Light {
+    /// Shows a colour until the next one; must not wait.
+    fn show(&mut self, colour: Colour);
+}
+
+/// The radio does not work: no memory, or a fault of its driver. Ask again later.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RadioFault;
+
+/// The radio, for the network policy alone.
+///
+/// Only the link is dealt with here; addresses belong to the network stack, see [`Address`]. Station
+/// and access point may exclude each other: switching one on may drop the other.
+#[expect(
+    async_fn_in_trait,
+    reason = "awaited in place by the network service alone, so no bound is missing"
+)]
+pub trait Radio {
+    /// Listens on all channels, strongest first; what does not fit `heard` is left out. Takes some
+    /// seconds.
+    ///
+    /// # Errors
+    /// [`RadioFault`] when the radio could not listen.
+    async fn scan<const N: usize>(&mut self, heard: &mut Vec<Heard, N>) -> Result<(), RadioFault>;
+
+    /// Leaves the joined network, if any, and tries this one once. Ends by itself within 20 s.
+    async fn join(&mut self, network: &Network) -> Joined;
+
+    /// Leaves the joined network; nothing happens if there is none.
+    async fn leave(&mut self);
+
+    /// Switches the access point on.
+    ///
+    /// # Errors
+    /// [`RadioFault`] when the radio could not.
+    async fn open_access_point(&mut self, network: &Network) -> Result<(), RadioFault>;
+
+    /// Switches the access point off; nothing happens if it is off.
+    ///
+    /// # Errors
+    /// [`RadioFault`] when the radio could not.
+    async fn close_access_point(&mut self) -> Result<(), RadioFault>;
+
+    /// Whether a network is joined at this moment.
+    fn is_joined(&self) -> bool;
+
+    /// Waits until the joined network is lost. Nothing is retried by itself. May be dropped and called
+    /// again at any time.
+    async fn lost(&mut self);
+}
+
+/// The network stack's address.
+#[expect(
+    async_fn_in_trait,
+    reason = "awaited in place by the network service alone, so no bound is missing"
+)]
+pub trait Address {
+    /// Asks the joined network for an address.
+    fn ask(&self);
+
+    /// Takes 192.168.4.1, the address of the machine on its own network, and gives its guests
+    /// addresses, for ever.
+    async fn serve_guests(&self) -> !;
+}
+
 /// What a board knows about itself, for diagnostics.
 #[derive(Clone, Copy, Debug)]
 pub struct Vitals {
@@ -21,4 +110,6 @@ pub struct Vitals {
     pub free_memory: fn() -> u32,
     /// Why the firmware started.
     pub reset_reason: &'static str,
+    /// The last words of a firmware that panicked before this start; empty if there was none.
+    pub last_panic: &'static str,
 }

@@ -17,3 +17,4 @@ pub mod machine;
 pub mod motion;
 pub mod settings;
 pub mod text;
+pub mod wifi;

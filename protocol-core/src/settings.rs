@@ -1,6 +1,7 @@
 //! What the arm remembers, and its form in memory.
 
 use crate::arm::Calibration;
+use crate::wifi::{MAX_NETWORK, Network};
 use heapless::String;
 
 /// Longest machine name, in bytes.
@@ -44,6 +45,8 @@ pub struct Settings {
     pub name: MachineName,
     /// The servos' offsets.
     pub calibration: Calibration,
+    /// The network to join.
+    pub network: Option<Network>,
 }
 
 /// One setting as it is stored: under its key, behind a version byte.
@@ -53,23 +56,30 @@ pub enum Setting {
     Name(MachineName),
     /// Under key 2.
     Calibration(Calibration),
+    /// Under key 3.
+    Network(Network),
 }
 
 /// Longest stored form of a setting, in bytes.
-pub const MAX_SETTING: usize = 1 + MAX_NAME;
+pub const MAX_SETTING: usize = 1 + if MAX_NETWORK > MAX_NAME {
+    MAX_NETWORK
+} else {
+    MAX_NAME
+};
 
 /// Version of the stored forms; a setting of another version reads as absent.
 const VERSION: u8 = 1;
 
 impl Setting {
     /// Keys of all settings.
-    pub const KEYS: [u8; 2] = [1, 2];
+    pub const KEYS: [u8; 3] = [1, 2, 3];
 
     /// The key it is stored under.
     pub const fn key(&self) -> u8 {
         match self {
             Self::Name(_) => 1,
             Self::Calibration(_) => 2,
+            Self::Network(_) => 3,
         }
     }
 
@@ -81,6 +91,7 @@ impl Setting {
         let _ = match self {
             Self::Name(name) => bytes.extend_from_slice(name.as_str().as_bytes()),
             Self::Calibration(calibration) => bytes.extend_from_slice(&calibration.to_bytes()),
+            Self::Network(network) => bytes.extend_from_slice(&network.to_bytes()),
         };
         bytes
     }
@@ -96,6 +107,7 @@ impl Setting {
                 let value = value.try_into().ok()?;
                 Some(Self::Calibration(Calibration::from_bytes(value)))
             }
+            3 => Network::from_bytes(value).map(Self::Network),
             _ => None,
         }
     }
@@ -107,6 +119,7 @@ impl Settings {
         match setting {
             Setting::Name(name) => self.name = name,
             Setting::Calibration(calibration) => self.calibration = calibration,
+            Setting::Network(network) => self.network = Some(network),
         }
     }
 }
@@ -165,7 +178,7 @@ mod tests {
                 &[VERSION],
                 &[VERSION, 0xff],
                 &[2, b'a'],
-                &[VERSION; 60],
+                &[VERSION; 200],
             ] {
                 assert_eq!(Setting::from_bytes(key, bytes), None, "{key} {bytes:?}");
             }

@@ -12,6 +12,7 @@ use firmware::boards::desktop::net::Listener;
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
 use firmware::boards::desktop::{IDENTITY, VITALS};
 use firmware::services::House;
+use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{Server, serve};
 use firmware::services::storage::Memory;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -179,7 +180,10 @@ fn serve_clients(
 
 #[embassy_executor::task]
 async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
-    house.arm.tick(servos, frame).await;
+    house
+        .arm
+        .tick(servos, TimedFrames::every(frame), frame)
+        .await;
 }
 
 #[embassy_executor::task]

@@ -3,7 +3,7 @@
 //! The machine is locked for the time of one of its methods only, all of which are short. A client
 //! that waits for its move waits here, in its own task; the tick waits for nobody.
 
-use crate::board::Servos;
+use crate::board::{Frames, Servos};
 use core::array;
 use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
@@ -52,28 +52,33 @@ impl Arm {
         Rest { arm: self, client }
     }
 
-    /// The servo tick: one set-point each `frame`, for ever.
+    /// The servo tick: one set-point in each of the servos' frames, which are `length` apart, for ever.
     ///
     /// The machine's time is the number of frames, so that a set-point is a function of the moves and
     /// not of how late a frame was. Moves that begin between two frames are answered there and then.
-    pub async fn tick(&self, mut servos: impl Servos, frame: Duration) -> ! {
+    pub async fn tick(
+        &self,
+        mut servos: impl Servos,
+        mut frames: impl Frames,
+        length: Duration,
+    ) -> ! {
+        let length = Micros::new(length.as_micros());
         let mut time = Micros::default();
-        let mut due = Instant::now();
         loop {
-            let event = self.with(|machine| machine.next_event());
-            if let Some(event) = event.filter(|event| *event < time) {
-                Timer::at(due - Duration::from_micros((time - event).get())).await;
-                self.with(|machine| machine.advance(event));
-                self.deliver();
-                continue;
-            }
-            Timer::at(due).await;
+            frames.next().await;
+            let began = Instant::now();
             let set_point = self.with(|machine| machine.tick(time));
             servos.write(time, &set_point);
             self.deliver();
-            time = time + Micros::new(frame.as_micros());
-            // After a stall the arm goes on from where it was instead of catching up in a rush.
-            due = (due + frame).max(Instant::now());
+            while let Some(event) = self.with(|machine| machine.next_event()) {
+                if event >= time + length {
+                    break;
+                }
+                Timer::at(began + Duration::from_micros((event - time).get())).await;
+                self.with(|machine| machine.advance(event));
+                self.deliver();
+            }
+            time = time + length;
         }
     }
 
@@ -83,6 +88,30 @@ impl Arm {
                 signal.signal(report);
             }
         }
+    }
+}
+
+/// Frames by the clock, for servos that have no frame of their own.
+pub struct TimedFrames {
+    due: Instant,
+    length: Duration,
+}
+
+impl TimedFrames {
+    /// The first frame begins now.
+    pub fn every(length: Duration) -> Self {
+        Self {
+            due: Instant::now(),
+            length,
+        }
+    }
+}
+
+impl Frames for TimedFrames {
+    async fn next(&mut self) {
+        Timer::at(self.due).await;
+        // After a stall the arm goes on from where it was instead of catching up in a rush.
+        self.due = (self.due + self.length).max(Instant::now());
     }
 }
 

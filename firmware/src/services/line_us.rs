@@ -17,6 +17,7 @@ use protocol_core::lineus::{Diagnostics, MAX_REPLY, Reply, Request, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 use protocol_core::motion::{Micros, Steps};
 use protocol_core::settings::{MachineName, Setting};
+use protocol_core::wifi::Network;
 
 /// The port of Line-us.
 pub const PORT: u16 = 1337;
@@ -145,6 +146,7 @@ async fn perform(request: Request, reply: &mut Reply, client: Client, house: &Ho
         Request::Diagnostics => diagnose(reply, house),
         Request::Name => reply.name(&house.name()),
         Request::Rename(name) => rename(name, reply, client, house).await,
+        Request::Join(network) => join(network, reply, client, house).await,
         Request::Calibrate => calibrate(true, reply, client, house).await,
         Request::ClearCalibration => calibrate(false, reply, client, house).await,
     }
@@ -162,6 +164,7 @@ fn diagnose(reply: &mut Reply, house: &House) {
         calibration,
         free_memory: (house.vitals.free_memory)(),
         reset_reason: house.vitals.reset_reason,
+        last_panic: house.vitals.last_panic,
     });
 }
 
@@ -173,6 +176,18 @@ async fn rename(name: MachineName, reply: &mut Reply, client: Client, house: &Ho
             house.rename(name);
         }
         Err(error) => refuse_store("name", &error, reply),
+    }
+}
+
+/// The reply says that the network is remembered; joining it may well end this connection.
+async fn join(network: Network, reply: &mut Reply, client: Client, house: &House) {
+    let _rest = house.arm.rest(client).await;
+    match house.store.save(Setting::Network(network.clone())).await {
+        Ok(()) => {
+            reply.ok();
+            house.wifi.change(network);
+        }
+        Err(error) => refuse_store("network", &error, reply),
     }
 }
 

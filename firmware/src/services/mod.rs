@@ -1,7 +1,10 @@
 //! One module a service; [`House`] is what they share.
 
 pub mod arm;
+pub mod dhcp;
 pub mod line_us;
+pub mod network;
+pub mod panel;
 pub mod storage;
 
 use crate::board::Vitals;
@@ -9,6 +12,8 @@ use arm::Arm;
 use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use network::Wifi;
+use panel::Panel;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Machine};
 use protocol_core::settings::{MachineName, Settings};
@@ -20,6 +25,10 @@ pub struct House {
     pub arm: Arm,
     /// Where settings go.
     pub store: Store,
+    /// The network to be in.
+    pub wifi: Wifi,
+    /// Light and button.
+    pub panel: Panel,
     /// Who this machine is.
     pub identity: Identity,
     /// How it is.
@@ -33,6 +42,8 @@ impl House {
         Self {
             arm: Arm::new(Machine::new(data, settings.calibration)),
             store: Store::new(),
+            wifi: Wifi::new(settings.network),
+            panel: Panel::new(),
             identity,
             vitals,
             name: Mutex::new(RefCell::new(settings.name)),

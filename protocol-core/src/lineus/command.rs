@@ -5,6 +5,7 @@ use crate::machine::Manner;
 use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
 use crate::settings::{MAX_NAME, MachineName};
 use crate::text::Words;
+use crate::wifi::{MAX_PASSWORD, MAX_SSID, Network, Password, Ssid};
 
 /// A valid command, its numbers as written: not yet scaled, not yet limited.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,6 +48,8 @@ pub enum Command {
     Name,
     /// `M550 P`.
     Rename(MachineName),
+    /// `M587 S P`.
+    Join(Network),
 }
 
 /// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
@@ -94,7 +97,8 @@ fn other_than_a_move<'a>(code: (u8, u32), mut words: Words<'a>) -> Result<Comman
         (b'M', 122) => without_parameters(&mut words, Command::Diagnostics),
         (b'M', 374) => calibration(&mut words),
         (b'M', 550) => name(&mut words),
-        (b'M', code @ (587 | 588 | 997)) => Err(Refusal::NotYet(code)),
+        (b'M', 587) => network(&mut words),
+        (b'M', code @ (588 | 997)) => Err(Refusal::NotYet(code)),
         (letter, number) => Err(Refusal::UnknownCommand(letter.into(), number)),
     }
 }
@@ -217,6 +221,33 @@ fn name<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
             without_parameters(words, Command::Rename(name))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    let mut letters = Letters::default();
+    let (mut ssid, mut password) = (None, None);
+    while let Some(letter) = words.letter()? {
+        letters.once(letter)?;
+        let text = match letter {
+            'S' | 'P' => words.text(letter)?,
+            _ => return Err(Refusal::UnknownParameter(letter)),
+        };
+        if letter == 'S' {
+            let name = text.unescape::<MAX_SSID>();
+            let name = name.and_then(|name| Ssid::new(name.as_bytes()));
+            ssid = Some(name.ok_or(Refusal::BadText('S', text.raw(), "1 to 32 bytes"))?);
+        } else {
+            let phrase = text.unescape::<MAX_PASSWORD>();
+            let phrase = phrase.and_then(|phrase| Password::new(phrase.as_bytes()));
+            // What was typed is a secret, also when it is wrong.
+            password = Some(phrase.ok_or(Refusal::BadText('P', "hidden", "8 to 63 bytes"))?);
+        }
+    }
+    match ssid {
+        Some(ssid) => Ok(Command::Join(Network { ssid, password })),
+        None if password.is_some() => Err(Refusal::Missing('S')),
+        None => Err(Refusal::NotYet(587)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Why a line is refused, and the one place where that becomes text.
 
 use crate::settings::MAX_NAME;
-use crate::text::{MAX_LINE, TooLong, WordError, excerpt};
+use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt};
 use core::fmt;
 
 /// Why a line is refused; nothing has changed then.
@@ -17,6 +17,8 @@ pub enum Refusal<'a> {
     NotYet(u32),
     /// A letter that the command does not have.
     UnknownParameter(char),
+    /// A letter that the command needs.
+    Missing(char),
     /// A letter that came twice; F and S of G94 are the same.
     Repeated(char),
     /// A number that the parameter cannot have.
@@ -59,10 +61,14 @@ impl fmt::Display for Refusal<'_> {
             Self::NotYet(997) => {
                 out.write_str("M997 is missing: this firmware cannot update itself yet")
             }
+            Self::NotYet(587) => {
+                out.write_str("M587 without S is missing: this firmware cannot list networks yet")
+            }
             Self::NotYet(code) => write!(
                 out,
-                "M{code} is missing: this firmware has no WiFi commands yet"
+                "M{code} is missing: this firmware cannot forget networks yet"
             ),
+            Self::Missing(letter) => write!(out, "parameter {letter} is missing"),
             Self::UnknownParameter(letter) => write!(out, "unknown parameter {letter}"),
             Self::Repeated(letter) => write!(out, "parameter {letter} is repeated"),
             Self::OutOfRange {
@@ -74,12 +80,12 @@ impl fmt::Display for Refusal<'_> {
             }
             Self::ZeroScale => out.write_str("S must not be zero"),
             Self::BadText(letter, text, expected) => {
-                write!(out, "{letter} is '{}', it may be {expected}", excerpt(text))
+                write!(out, "{letter} is '{}', it may be {expected}", short(text))
             }
             Self::BadName(text) => write!(
                 out,
                 "P is '{}', a name is 1 to {MAX_NAME} letters, digits and inner hyphens",
-                excerpt(text)
+                short(text)
             ),
         }
     }
@@ -88,7 +94,7 @@ impl fmt::Display for Refusal<'_> {
 fn words(error: WordError<'_>, out: &mut fmt::Formatter<'_>) -> fmt::Result {
     match error {
         WordError::NotUtf8 => out.write_str("line is not UTF-8 text"),
-        WordError::NoCode(text) => write!(out, "unknown command '{}'", excerpt(text)),
+        WordError::NoCode(text) => write!(out, "unknown command '{}'", short(text)),
         WordError::OpenComment => out.write_str("comment without closing bracket"),
         WordError::OpenQuote(letter) => write!(out, "{letter} has no closing quote"),
         WordError::NoLetter(found) => {
@@ -96,16 +102,20 @@ fn words(error: WordError<'_>, out: &mut fmt::Formatter<'_>) -> fmt::Result {
             write!(
                 out,
                 "'{}' where a parameter letter should be",
-                excerpt(found.encode_utf8(&mut utf8))
+                short(found.encode_utf8(&mut utf8))
             )
         }
         WordError::NoNumber(letter) => write!(out, "{letter} has no number"),
         WordError::NotANumber(letter, text) => {
-            write!(out, "{letter} is '{}', not a decimal number", excerpt(text))
+            write!(out, "{letter} is '{}', not a decimal number", short(text))
         }
         WordError::NoValue(letter) => write!(out, "{letter} has no value"),
         WordError::Value(letter, text) => {
-            write!(out, "{letter} takes no value, but has '{}'", excerpt(text))
+            write!(out, "{letter} takes no value, but has '{}'", short(text))
         }
     }
+}
+
+fn short(text: &str) -> impl fmt::Display + '_ {
+    excerpt(text, MAX_EXCERPT)
 }

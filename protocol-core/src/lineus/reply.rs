@@ -5,6 +5,7 @@ use crate::arm::{Angles, Calibration};
 use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
 use crate::settings::MachineName;
+use crate::text::excerpt;
 use core::fmt::{self, Write};
 use heapless::Vec;
 
@@ -15,6 +16,9 @@ pub const TERMINATOR: &str = "\r\n\0";
 pub const MAX_REPLY: usize = 512;
 /// Version in the greeting: the level of the original's protocol that is complete, then our own.
 pub const VERSION: &str = concat!("1.0.4 Quill ", env!("CARGO_PKG_VERSION"));
+
+/// Longest piece of a panic's text that diagnostics tell, in characters.
+const MAX_PANIC: usize = 120;
 
 /// Who this machine is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +52,8 @@ pub struct Diagnostics<'a> {
     pub free_memory: u32,
     /// Why it started.
     pub reset_reason: &'a str,
+    /// The last words of a firmware that panicked before, if there are any.
+    pub last_panic: &'a str,
 }
 
 /// One message to a client.
@@ -157,6 +163,16 @@ impl Reply {
             state.free_memory,
             state.reset_reason,
         ));
+        if !state.last_panic.is_empty() {
+            self.text.truncate(self.text.len() - TERMINATOR.len());
+            // Two texts of this length fit the message beside everything else.
+            let _ = write!(
+                self.text,
+                " LastPanic:\"{}\"",
+                excerpt(state.last_panic, MAX_PANIC)
+            );
+            self.push(TERMINATOR);
+        }
     }
 
     fn place(&mut self, position: Position, info: Option<&str>) {
@@ -342,9 +358,14 @@ mod tests {
                 },
                 free_memory: u32::MAX,
                 reset_reason: "the watchdog bit after a long silence",
+                last_panic: &"panicked at \"somewhere\"\n".repeat(9),
             });
         });
-        assert!(text.ends_with("silence\""), "cut off: {text}");
+        assert!(
+            text.contains("silence\" LastPanic:\"panicked at 'somewhere'?")
+                && text.ends_with("...\""),
+            "{text}"
+        );
         // Outside quotes, blanks separate tokens.
         let unquoted: StdString = text.split('"').step_by(2).collect();
         let mut tokens = unquoted.split_whitespace();

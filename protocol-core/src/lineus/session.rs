@@ -7,6 +7,7 @@ use crate::machine::{Errand, Manner, Target};
 use crate::motion::{StepSize, Transform, WideCoordinate};
 use crate::settings::MachineName;
 use crate::text::LineBuffer;
+use crate::wifi::Network;
 
 /// What a line asks for, in arm coordinates; each is answered by exactly one reply.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,6 +39,8 @@ pub enum Request {
     Name,
     /// To be answered by [`Reply::name`].
     Rename(MachineName),
+    /// Remember a network, answer [`Reply::ok`], join it.
+    Join(Network),
 }
 
 /// What belongs to one connection: the line being received, scale and origin.
@@ -108,6 +111,7 @@ impl Session {
             Command::ClearCalibration => Request::ClearCalibration,
             Command::Name => Request::Name,
             Command::Rename(name) => Request::Rename(name),
+            Command::Join(network) => Request::Join(network),
         })
     }
 }
@@ -116,6 +120,7 @@ impl Session {
 mod tests {
     extern crate std;
     use super::*;
+    use crate::wifi::{Password, Ssid};
     use proptest::prelude::*;
     use std::string::{String, ToString};
     use std::vec::Vec;
@@ -236,11 +241,18 @@ mod tests {
             ("M550 P\"open", "P has no closing quote"),
             (
                 "M587",
-                "M587 is missing: this firmware has no WiFi commands yet",
+                "M587 without S is missing: this firmware cannot list networks yet",
             ),
+            ("M587 Pcorrect-horse", "parameter S is missing"),
+            ("M587 S\"\"", "S is '', it may be 1 to 32 bytes"),
+            (
+                "M587 Shome Pshort",
+                "P is 'hidden', it may be 8 to 63 bytes",
+            ),
+            ("M587 Shome Qx", "unknown parameter Q"),
             (
                 "M588 S*",
-                "M588 is missing: this firmware has no WiFi commands yet",
+                "M588 is missing: this firmware cannot forget networks yet",
             ),
             (
                 "M997",
@@ -290,6 +302,34 @@ mod tests {
                 name.clone().map_or(Request::Answered, Request::Rename),
                 "{line}"
             );
+        }
+    }
+
+    #[test]
+    fn networks_quoted_and_plain() {
+        for (line, ssid, password) in [
+            ("M587 Smy-ssid Pmypassword", "my-ssid", "mypassword"),
+            (
+                "M587 Smy-ssid P\"password with spaces\"",
+                "my-ssid",
+                "password with spaces",
+            ),
+            (
+                "m587 p\"say \"\"hi\"\" twice\" s\"caf\u{e9} ;(x)\"",
+                "caf\u{e9} ;(x)",
+                "say \"hi\" twice",
+            ),
+            ("M587 Sopen", "open", ""),
+        ] {
+            let (ssid, password) = (
+                Ssid::new(ssid.as_bytes()),
+                Password::new(password.as_bytes()),
+            );
+            let network = Network {
+                ssid: ssid.unwrap(),
+                password,
+            };
+            assert_eq!(only(line).0, Request::Join(network), "{line}");
         }
     }
 
@@ -355,7 +395,11 @@ mod tests {
         let quotes = "\"\"";
         let line = std::format!("M587 S\"{}\" P\"{}\"", quotes.repeat(32), quotes.repeat(63));
         assert!(line.len() <= crate::text::MAX_LINE);
-        assert!(only(&line).1.contains("M587"));
+        let network = Network {
+            ssid: Ssid::new(&[b'"'; 32]).unwrap(),
+            password: Password::new(&[b'"'; 63]),
+        };
+        assert_eq!(only(&line).0, Request::Join(network));
     }
 
     /// Lines that are nearly right, where the mistakes hide.

@@ -295,15 +295,15 @@ const fn ends_number(rest: &[u8]) -> bool {
 /// Longest piece of a client's own text that a message repeats, in characters.
 pub const MAX_EXCERPT: usize = 24;
 
-/// A client's text as a message may repeat it: shortened, and without the characters that would
-/// end the quoted message or the reply.
-pub fn excerpt(text: &str) -> impl fmt::Display + '_ {
-    struct Excerpt<'a>(&'a str);
+/// A text as a message may repeat it: shortened to `most` characters, and without those that would end
+/// the quoted message or the reply.
+pub fn excerpt(text: &str, most: usize) -> impl fmt::Display + '_ {
+    struct Excerpt<'a>(&'a str, usize);
     impl fmt::Display for Excerpt<'_> {
         fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
             use fmt::Write;
             for (count, character) in self.0.chars().enumerate() {
-                if count == MAX_EXCERPT {
+                if count == self.1 {
                     return out.write_str("...");
                 }
                 out.write_char(match character {
@@ -316,7 +316,7 @@ pub fn excerpt(text: &str) -> impl fmt::Display + '_ {
             Ok(())
         }
     }
-    Excerpt(text)
+    Excerpt(text, most)
 }
 
 #[cfg(test)]
@@ -451,7 +451,7 @@ mod tests {
 
         #[test]
         fn excerpts_are_short_and_end_no_message(text: StdString) {
-            let shown = format!("{}", excerpt(&text));
+            let shown = format!("{}", excerpt(&text, MAX_EXCERPT));
             prop_assert!(shown.chars().count() <= MAX_EXCERPT + 3);
             prop_assert!(!shown.contains(['"', '\r', '\n', '\0']));
         }

@@ -20,6 +20,7 @@ pub const IDENTITY: Identity = Identity {
 pub const VITALS: Vitals = Vitals {
     free_memory,
     reset_reason: "program start",
+    last_panic: "",
 };
 
 /// Available memory in bytes where the system tells it, as far as 32 bits go; else 0.
