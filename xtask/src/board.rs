@@ -1,0 +1,122 @@
+//! The boards that can be built, and how.
+
+use crate::toolchain::Toolchain;
+use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Board {
+    /// The program on this computer.
+    Desktop,
+    /// QEMU's `virt` machine.
+    Virt,
+    /// ESP32-C3.
+    Esp32c3,
+    /// ESP32-C6.
+    Esp32c6,
+    /// The first ESP32; needs Espressif's toolchain.
+    Esp32,
+    /// ESP32-S3; needs Espressif's toolchain.
+    Esp32s3,
+}
+
+impl Board {
+    /// The boards whose chip is on a module that can be bought.
+    pub const CHIPS: [Self; 2] = [Self::Esp32c3, Self::Esp32c6];
+
+    /// Its name, which is that of its feature.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Desktop => "desktop",
+            Self::Virt => "virt",
+            Self::Esp32c3 => "esp32c3",
+            Self::Esp32c6 => "esp32c6",
+            Self::Esp32 => "esp32",
+            Self::Esp32s3 => "esp32s3",
+        }
+    }
+
+    /// What the compiler calls it; `None` for this computer.
+    pub const fn target(self) -> Option<&'static str> {
+        match self {
+            Self::Desktop => None,
+            Self::Virt | Self::Esp32c3 => Some("riscv32imc-unknown-none-elf"),
+            Self::Esp32c6 => Some("riscv32imac-unknown-none-elf"),
+            Self::Esp32 => Some("xtensa-esp32-none-elf"),
+            Self::Esp32s3 => Some("xtensa-esp32s3-none-elf"),
+        }
+    }
+
+    /// The binary of the firmware for it.
+    pub const fn binary(self) -> &'static str {
+        match self {
+            Self::Desktop => "desktop",
+            Self::Virt => "virt",
+            _ => "esp",
+        }
+    }
+
+    /// Whether it is flashed onto something.
+    pub const fn is_chip(self) -> bool {
+        !matches!(self, Self::Desktop | Self::Virt)
+    }
+
+    /// Builds one of the firmware's binaries, and gives the file.
+    pub fn build(self, binary: &str, extra_features: &[&str], setup: bool) -> Result<PathBuf> {
+        let profile = if self == Self::Desktop {
+            "release"
+        } else {
+            "chip"
+        };
+        let mut cargo = match self.target() {
+            None => Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into())),
+            Some(target) => Toolchain::find(target, setup)?.cargo(target),
+        };
+        let mut features = vec![self.name()];
+        features.extend(extra_features);
+        cargo
+            .current_dir(root())
+            .args(["build", "--package", "firmware", "--bin", binary])
+            .args(["--profile", profile, "--no-default-features"])
+            .args(["--features", &features.join(",")]);
+        if let Some(target) = self.target() {
+            cargo.args(["--target", target]);
+        }
+        run(&mut cargo)?;
+        let folder = if profile == "chip" { "chip" } else { "release" };
+        let mut file = target_dir();
+        file.extend(self.target());
+        file.extend([folder, binary]);
+        if !file.exists() {
+            bail!("{} is not where cargo should have put it", file.display());
+        }
+        Ok(file)
+    }
+}
+
+/// The project's folder.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap_or(Path::new("."))
+}
+
+/// Where cargo builds.
+pub fn target_dir() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+}
+
+/// Runs a command to its good end.
+pub fn run(command: &mut Command) -> Result<()> {
+    let shown = format!("{command:?}");
+    let status = command
+        .status()
+        .with_context(|| format!("cannot start {shown}"))?;
+    if !status.success() {
+        bail!("{shown} ended with {status}");
+    }
+    Ok(())
+}

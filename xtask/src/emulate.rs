@@ -1,0 +1,83 @@
+//! The emulated arm for a person: console, picture and trace, until Ctrl-C.
+
+use crate::Emulate;
+use anyhow::Result;
+use firmware::board::Servos;
+use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder};
+use protocol_core::machine::ArmData;
+use std::io::BufRead;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
+use std::time::Duration;
+use xtask::board::Board;
+use xtask::emulator::{Emulator, Options};
+use xtask::records::Record;
+
+static STOP: AtomicBool = AtomicBool::new(false);
+
+pub fn emulate(options: Emulate, setup: bool) -> Result<()> {
+    let firmware = Board::Virt.build(Board::Virt.binary(), &[], setup)?;
+    let machine = Options {
+        line_us: options.line_us,
+        flash: options.flash,
+        count_instructions: false,
+    };
+    let outputs = Outputs {
+        trace: options.trace,
+        picture: Some(options.picture.clone()),
+    };
+    let (recorder, mut servos) = Recorder::start(outputs, ArmData::default(), false)?;
+    let mut emulator = Emulator::boot(&firmware, &machine)?;
+    ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;
+    println!("picture: {}; stop with Ctrl-C", options.picture.display());
+    let typed = read_keyboard();
+    let outcome = follow(&mut emulator, &mut servos, options.line_us, &typed);
+    drop(emulator);
+    recorder.finish()?;
+    outcome
+}
+
+fn follow(
+    emulator: &mut Emulator,
+    servos: &mut RecordedServos,
+    line_us: std::net::SocketAddr,
+    typed: &std::sync::mpsc::Receiver<String>,
+) -> Result<()> {
+    while !STOP.load(Ordering::Relaxed) {
+        if let Some(line) = emulator.next_line(Duration::from_millis(50))? {
+            println!("{line}");
+            if line.contains("Line-us clients") {
+                println!("  on this computer: {line_us}");
+            }
+        }
+        while let Ok(line) = typed.try_recv() {
+            emulator.say(&line)?;
+        }
+        for record in emulator.records()? {
+            match record {
+                Record::Frame(frame) => servos.write(frame.time, &frame.set_point),
+                Record::Light {
+                    colour: [red, green, blue],
+                    ..
+                } => {
+                    println!("light: #{red:02x}{green:02x}{blue:02x}");
+                }
+                Record::Lost(count) => println!("{count} records were lost: the picture has gaps"),
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Lines that are typed; at the end of the input there are no more.
+fn read_keyboard() -> std::sync::mpsc::Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}

@@ -1,0 +1,8 @@
+//! What the developer's commands are made of; the emulator is also what its tests drive.
+
+pub mod bench;
+pub mod board;
+pub mod emulator;
+pub mod records;
+pub mod size;
+pub mod toolchain;

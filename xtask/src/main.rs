@@ -1,0 +1,128 @@
+//! The developer's commands.
+
+mod emulate;
+mod image;
+mod table;
+mod test;
+
+use anyhow::{Result, bail};
+use clap::{Parser, Subcommand};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::Command;
+use xtask::bench;
+use xtask::board::{Board, run};
+use xtask::emulator::QEMU;
+use xtask::toolchain::require;
+
+/// Build, emulate, flash, measure and test the firmware.
+#[derive(Parser)]
+#[command(name = "cargo xtask", version)]
+struct Cli {
+    /// Install what is missing with apt, as root, instead of saying what to install
+    #[arg(long, global = true)]
+    setup: bool,
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Build the firmware for a board
+    Build {
+        /// The board
+        board: Board,
+    },
+    /// Run the firmware in QEMU: connect to it as to the desktop arm, stop it with Ctrl-C
+    ///
+    /// What you type goes to the machine's surroundings: `button down`, `button up`.
+    Emulate(Emulate),
+    /// Build, and write the firmware onto a chip that is connected, with espflash
+    Flash {
+        /// The board
+        board: Board,
+        /// The serial port; found by itself where there is only one
+        #[arg(long)]
+        port: Option<String>,
+    },
+    /// Build, and make one file to write at the beginning of a chip's flash
+    Image {
+        /// The board
+        board: Board,
+    },
+    /// Tell how much flash and memory the firmware takes on each chip, and how much of that a bare
+    /// program takes that joins WiFi and echoes TCP
+    Size,
+    /// Tell what the firmware's work costs in instructions of the chip, beside what else one could take
+    Bench {
+        /// Print `work,goal,measured,peer,peer_measured`
+        #[arg(long)]
+        csv: bool,
+    },
+    /// Run everything that must pass: format, lints, documentation, tests, emulator, images
+    Test,
+}
+
+#[derive(clap::Args)]
+struct Emulate {
+    /// Where Line-us clients connect
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
+    line_us: SocketAddr,
+    /// The machine's flash, kept between runs; made if it does not exist
+    #[arg(long, value_name = "FILE", default_value = "quill.flash")]
+    flash: PathBuf,
+    /// The picture, SVG or PNG, rewritten whenever the arm comes to rest
+    #[arg(long, value_name = "FILE", default_value = "drawing.svg")]
+    picture: PathBuf,
+    /// A row for each servo frame of the moving arm
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+}
+
+fn main() -> Result<()> {
+    let cli = Cli::parse();
+    let setup = cli.setup;
+    match cli.task {
+        Task::Build { board } => {
+            println!("{}", board.build(board.binary(), &[], setup)?.display());
+            Ok(())
+        }
+        Task::Emulate(options) => {
+            require(QEMU.0, QEMU.1, setup)?;
+            emulate::emulate(options, setup)
+        }
+        Task::Flash { board, port } => flash(board, port.as_deref(), setup),
+        Task::Image { board } => {
+            println!("{}", image::image(board, setup)?.display());
+            Ok(())
+        }
+        Task::Size => table::sizes(setup),
+        Task::Bench { csv } => {
+            require(QEMU.0, QEMU.1, setup)?;
+            table::bench(&bench::measure(setup)?, csv);
+            Ok(())
+        }
+        Task::Test => test::everything(setup),
+    }
+}
+
+fn flash(board: Board, port: Option<&str>, setup: bool) -> Result<()> {
+    if !board.is_chip() {
+        bail!("{} is not a chip", board.name());
+    }
+    if Command::new("espflash").arg("--version").output().is_err() {
+        if !setup {
+            bail!(
+                "espflash is missing: cargo install espflash --locked, or let this command do it with --setup"
+            );
+        }
+        run(Command::new("cargo").args(["install", "espflash", "--locked"]))?;
+    }
+    let image = image::image(board, setup)?;
+    let mut espflash = Command::new("espflash");
+    espflash.args(["write-bin", "--chip", board.name()]);
+    if let Some(port) = port {
+        espflash.args(["--port", port]);
+    }
+    run(espflash.arg("0x0").arg(image))
+}

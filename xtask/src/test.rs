@@ -1,0 +1,111 @@
+//! Everything that must pass.
+
+use anyhow::Result;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+use xtask::board::{Board, root, run};
+use xtask::emulator::QEMU;
+use xtask::toolchain::require;
+
+/// Runs all checks, the quick ones first, up to the first that fails.
+pub fn everything(setup: bool) -> Result<()> {
+    require(QEMU.0, QEMU.1, setup)?;
+    step("format", || run(cargo().args(["fmt", "--all", "--check"])))?;
+    step("lints", || {
+        run(cargo().args([
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--locked",
+            "--",
+            "-D",
+            "warnings",
+        ]))
+    })?;
+    step("documentation", || {
+        run(cargo()
+            .args([
+                "doc",
+                "--workspace",
+                "--no-deps",
+                "--document-private-items",
+            ])
+            .env("RUSTDOCFLAGS", "-D warnings"))
+    })?;
+    step("tests", || {
+        run(cargo().args(["test", "--workspace", "--locked"]))
+    })?;
+    step("fuzzing", fuzz)?;
+    step("emulator", || {
+        let firmware = Board::Virt.build(Board::Virt.binary(), &[], setup)?;
+        run(cargo()
+            .args([
+                "test",
+                "--package",
+                "host-tests",
+                "--features",
+                "emulator",
+                "--test",
+                "emulator",
+                "--",
+                "--test-threads=2",
+            ])
+            .env("QUILL_VIRT_FIRMWARE", firmware))
+    })?;
+    for board in Board::CHIPS {
+        step(&format!("image for {}", board.name()), || {
+            println!("{}", crate::image::image(board, setup)?.display());
+            Ok(())
+        })?;
+    }
+    step("sizes", || crate::table::sizes(setup))?;
+    step("instructions", || {
+        crate::table::bench(&xtask::bench::measure(setup)?, false);
+        Ok(())
+    })
+}
+
+/// Fuzzes for a short while, where there is a nightly compiler to do it with.
+fn fuzz() -> Result<()> {
+    let nightly = Command::new("cargo")
+        .args(["+nightly", "--version"])
+        .env_remove("CARGO")
+        .output();
+    let fuzzer = Command::new("cargo").args(["fuzz", "--version"]).output();
+    if !nightly.is_ok_and(|output| output.status.success()) {
+        println!("skipped: there is no nightly compiler");
+        return Ok(());
+    }
+    if !fuzzer.is_ok_and(|output| output.status.success()) {
+        println!("skipped: cargo install cargo-fuzz --locked");
+        return Ok(());
+    }
+    let mut fuzz = Command::new("cargo");
+    for variable in ["CARGO", "RUSTUP_TOOLCHAIN"] {
+        fuzz.env_remove(variable);
+    }
+    fuzz.current_dir(root().join("host-tests")).args([
+        "+nightly",
+        "fuzz",
+        "run",
+        "session",
+        "--",
+        "-max_total_time=20",
+    ]);
+    run(&mut fuzz)
+}
+
+fn step(name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {
+    println!("\n== {name}");
+    let start = Instant::now();
+    work()?;
+    println!("== {name}: {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
+    cargo.current_dir(root() as &Path);
+    cargo
+}
