@@ -6,7 +6,7 @@ use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Timer};
 use firmware::boards::desktop::clock::{self, Speed};
-use firmware::boards::desktop::draw::{self, Answers, Outcome, Script};
+use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::flash::{self, FileFlash};
 use firmware::boards::desktop::net::Listener;
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
@@ -209,7 +209,7 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     bar.set_style(style.map_err(io::Error::other)?);
     let path = &options.file;
     let script = draw::open(path, bar.clone());
-    let (script, answers, outcome) = script
+    let (script, outcome) = script
         .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
     let data = ArmData::default();
     let outputs = Outputs {
@@ -226,7 +226,7 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     let spawn = |spawner: Spawner| {
         spawner.spawn(arm(house, servos, frame)?);
         spawner.spawn(storage(house, memory)?);
-        spawner.spawn(client(script, answers, house)?);
+        spawner.spawn(client(script, house)?);
         Ok::<_, SpawnError>(())
     };
     clock::run(
@@ -246,9 +246,9 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     });
 
     #[embassy_executor::task]
-    async fn client(script: Script, answers: Answers, house: &'static House) {
+    async fn client(script: Script, house: &'static House) {
         if let Some(client) = Client::new(0) {
-            serve(script, answers, client, house).await;
+            serve(script, client, house).await;
         }
         while house.arm.with(|machine| machine.is_busy()) {
             Timer::after_millis(1).await;

@@ -7,7 +7,7 @@ use super::House;
 use crate::log::info;
 use core::fmt::Display;
 use core::sync::atomic::{AtomicU8, Ordering};
-use edge_nal::{Close, TcpAccept, TcpShutdown, TcpSplit};
+use edge_nal::{Close, TcpAccept, TcpShutdown};
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -56,10 +56,7 @@ impl Server {
             };
             self.count(1);
             info!("client {} connected", peer);
-            {
-                let (reader, writer) = socket.split();
-                serve(reader, writer, client, house).await;
-            }
+            serve(&mut socket, client, house).await;
             // It may be gone already; then there is nothing to close.
             let _ = with_timeout(FAREWELL, socket.close(Close::Both)).await;
             info!("client {} left", peer);
@@ -107,14 +104,14 @@ async fn farewell<S: Read + Write + TcpShutdown>(socket: &mut S) -> Result<(), S
 }
 
 /// Serves one connection until its client has closed it and everything received is executed.
-pub async fn serve(mut reader: impl Read, writer: impl Write, client: Client, house: &House) {
+pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     let mut session = Session::new();
     let mut reply = Reply::new();
-    let mut answers = Answers::new(writer);
+    let mut answers = Answers::new(socket);
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
-    while let Ok(length @ 1..) = reader.read(&mut chunk).await {
+    while let Ok(length @ 1..) = answers.socket.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
             perform(request, &mut reply, client, house).await;
@@ -216,8 +213,8 @@ fn refuse_store(what: &str, error: &dyn Display, reply: &mut Reply) {
 }
 
 /// The way of replies to one client: whole, in order, each in one write as long as it reads.
-struct Answers<W> {
-    writer: W,
+struct Answers<S> {
+    socket: S,
     /// The rest of a reply of which only a part went out: it comes before anything else.
     rest: heapless::Vec<u8, MAX_REPLY>,
     /// The client does not read: no reply waits for it.
@@ -226,10 +223,10 @@ struct Answers<W> {
     gone: bool,
 }
 
-impl<W: Write> Answers<W> {
-    const fn new(writer: W) -> Self {
+impl<S: Write> Answers<S> {
+    const fn new(socket: S) -> Self {
         Self {
-            writer,
+            socket,
             rest: heapless::Vec::new(),
             slow: false,
             gone: false,
@@ -248,6 +245,9 @@ impl<W: Write> Answers<W> {
         if unsent < message.len() {
             self.keep(message, unsent);
         }
+        // The next reply is to come in a segment of its own. A socket that fails here fails at the next
+        // write as well.
+        let _ = self.socket.flush().await;
     }
 
     fn keep(&mut self, message: &[u8], unsent: usize) {
@@ -259,7 +259,7 @@ impl<W: Write> Answers<W> {
     async fn push(&mut self, mut bytes: &[u8]) -> usize {
         while !bytes.is_empty() && !self.gone {
             let patience = if self.slow { Duration::MIN } else { PATIENCE };
-            match with_timeout(patience, self.writer.write(bytes)).await {
+            match with_timeout(patience, self.socket.write(bytes)).await {
                 Ok(Ok(written @ 1..)) => {
                     bytes = bytes.get(written..).unwrap_or_default();
                     self.slow = false;

@@ -30,7 +30,7 @@ impl Outcome {
     }
 }
 
-/// The file as the bytes that a client sends, a line at a time.
+/// The file as a client: it sends a line at a time, and hears the replies.
 pub struct Script {
     file: BufReader<File>,
     bar: ProgressBar,
@@ -40,32 +40,22 @@ pub struct Script {
     in_line: bool,
 }
 
-/// Where the replies go.
-pub struct Answers {
-    bar: ProgressBar,
-    outcome: Rc<RefCell<Outcome>>,
-}
-
 /// Opens a G-code file.
 ///
 /// # Errors
 /// When it cannot be read.
-pub fn open(path: &Path, bar: ProgressBar) -> io::Result<(Script, Answers, Rc<RefCell<Outcome>>)> {
+pub fn open(path: &Path, bar: ProgressBar) -> io::Result<(Script, Rc<RefCell<Outcome>>)> {
     let file = File::open(path)?;
     bar.set_length(file.metadata()?.len());
     let outcome = Rc::new(RefCell::new(Outcome::default()));
     let script = Script {
         file: BufReader::new(file),
-        bar: bar.clone(),
+        bar,
         outcome: outcome.clone(),
         ended: false,
         in_line: false,
     };
-    let answers = Answers {
-        bar,
-        outcome: outcome.clone(),
-    };
-    Ok((script, answers, outcome))
+    Ok((script, outcome))
 }
 
 impl ErrorType for Script {
@@ -106,11 +96,7 @@ impl Read for Script {
     }
 }
 
-impl ErrorType for Answers {
-    type Error = Infallible;
-}
-
-impl Write for Answers {
+impl Write for Script {
     /// One reply each time; the first is the greeting.
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         let message = String::from_utf8_lossy(bytes);
