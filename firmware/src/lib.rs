@@ -4,7 +4,7 @@
 //! board brings implementations of the traits in [`board`] and of the ecosystem's (edge-nal,
 //! embedded-storage-async), spawns the services, and is the only place with a chip's name in it.
 
-#![cfg_attr(not(feature = "std"), no_std)]
+#![cfg_attr(not(feature = "desktop"), no_std)]
 
 mod log;
 

@@ -1,19 +1,19 @@
-//! Logging: `log` on a desktop, nothing where a board brings no logger.
+//! Logging: the `log` crate where a board has a logger for it, else nothing.
 
 macro_rules! info {
     ($($message:tt)*) => {{
-        #[cfg(feature = "std")]
+        #[cfg(feature = "log")]
         ::log::info!($($message)*);
-        #[cfg(not(feature = "std"))]
+        #[cfg(not(feature = "log"))]
         let _ = ::core::format_args!($($message)*);
     }};
 }
 
 macro_rules! warning {
     ($($message:tt)*) => {{
-        #[cfg(feature = "std")]
+        #[cfg(feature = "log")]
         ::log::warn!($($message)*);
-        #[cfg(not(feature = "std"))]
+        #[cfg(not(feature = "log"))]
         let _ = ::core::format_args!($($message)*);
     }};
 }

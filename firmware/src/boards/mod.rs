@@ -2,3 +2,25 @@
 
 #[cfg(feature = "desktop")]
 pub mod desktop;
+#[cfg(feature = "embassy-tcp")]
+pub mod embassy_tcp;
+#[cfg(any(feature = "desktop", feature = "virt"))]
+pub mod scripted_radio;
+#[cfg(feature = "virt")]
+pub mod virt;
+
+/// Where the settings are in a flash of 4 MB; `partitions.csv` is the whole layout.
+pub const SETTINGS: core::ops::Range<u32> = 0x29_0000..0x29_8000;
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_settings_are_where_the_partition_table_says() {
+        let table = include_str!("../../partitions.csv");
+        let row = table.lines().find(|line| line.starts_with("settings,")).unwrap();
+        let fields: Vec<&str> = row.split(',').map(str::trim).collect();
+        let number = |text: &str| u32::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
+        let (start, size) = (number(fields[3]), number(fields[4]));
+        assert_eq!(super::SETTINGS, start..start + size);
+    }
+}

@@ -1,0 +1,83 @@
+//! TCP echo on the virt machine's network stack: the floor for the cost of a reply.
+#![no_std]
+#![no_main]
+
+use core::net::{Ipv4Addr, SocketAddr};
+use edge_nal::{TcpAccept, TcpBind};
+use embassy_executor::Spawner;
+use embassy_net::{Config, Runner, StackResources};
+use embedded_io_async::{Read, Write};
+use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
+use firmware::boards::virt::net::VirtNet;
+use firmware::boards::virt::world::{Lines, Recorder};
+use firmware::boards::virt::{self, executor};
+use static_cell::{ConstStaticCell, StaticCell};
+
+type Connections = Tcp<1, 2048, 2048>;
+
+#[riscv_rt::entry]
+fn main() -> ! {
+    let devices = virt::start();
+    executor::run(|spawner| {
+        let started = devices.and_then(|devices| {
+            spawner.spawn(records(devices.recorder).ok()?);
+            spawner.spawn(host_lines(devices.lines).ok()?);
+            spawner.spawn(boot(spawner, devices.card).ok()?);
+            Some(())
+        });
+        if started.is_none() {
+            log::error!("a device is missing");
+            virt::power::exit(virt::power::PANIC_STATUS);
+        }
+    })
+}
+
+#[embassy_executor::task]
+async fn boot(spawner: Spawner, card: VirtNet) {
+    static RESOURCES: StaticCell<StackResources<3>> = StaticCell::new();
+    static BUFFERS: ConstStaticCell<[Buffers<2048, 2048>; 1]> = ConstStaticCell::new([Buffers::new()]);
+    static POOL: StaticCell<Pool<1, 2048, 2048>> = StaticCell::new();
+    let resources = RESOURCES.init(StackResources::new());
+    let (stack, runner) = embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
+    let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
+    if let (Ok(network), Ok(echo)) = (network(runner), echo(tcp)) {
+        spawner.spawn(network);
+        spawner.spawn(echo);
+    }
+    stack.wait_config_up().await;
+    log::info!("Line-us clients: here they hear themselves");
+}
+
+#[embassy_executor::task]
+async fn echo(tcp: Connections) {
+    let Ok(acceptor) = tcp.bind(SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), 1337)).await else {
+        return;
+    };
+    loop {
+        let Ok((_, mut socket)) = acceptor.accept().await else {
+            continue;
+        };
+        let mut buffer = [0; 512];
+        while let Ok(length @ 1..) = socket.read(&mut buffer).await {
+            let heard = buffer.get(..length).unwrap_or_default();
+            if socket.write_all(heard).await.is_err() {
+                break;
+            }
+        }
+    }
+}
+
+#[embassy_executor::task]
+async fn network(mut runner: Runner<'static, VirtNet>) {
+    runner.run().await;
+}
+
+#[embassy_executor::task]
+async fn records(recorder: Recorder) {
+    recorder.run().await;
+}
+
+#[embassy_executor::task]
+async fn host_lines(lines: Lines) {
+    lines.run().await;
+}

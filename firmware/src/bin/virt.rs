@@ -1,0 +1,176 @@
+//! The firmware on QEMU's virt machine.
+#![no_std]
+#![no_main]
+
+use core::net::{Ipv4Addr, SocketAddr};
+use edge_nal::TcpBind;
+use embassy_executor::{SpawnError, Spawner};
+use embassy_net::{Config, Runner, Stack, StackResources};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::Duration;
+use firmware::boards::SETTINGS;
+use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
+use firmware::boards::scripted_radio::{OnAir, ScriptedRadio};
+use firmware::boards::virt::flash::Flash;
+use firmware::boards::virt::net::VirtNet;
+use firmware::boards::virt::world::button::Button;
+use firmware::boards::virt::world::light::Light;
+use firmware::boards::virt::world::servos::Servos;
+use firmware::boards::virt::world::{Lines, Recorder};
+use firmware::boards::virt::{self, Wired, executor};
+use firmware::services::House;
+use firmware::services::arm::TimedFrames;
+use firmware::services::line_us::{PORT, Server};
+use firmware::services::storage::Memory;
+use protocol_core::lineus::Identity;
+use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
+use static_cell::{ConstStaticCell, StaticCell};
+
+/// As on the desktop, so that pulses can be compared bit by bit.
+const FRAME: Duration = Duration::from_millis(10);
+/// One connection for each client, and one to turn another away.
+const CONNECTIONS: usize = MAX_CLIENTS + 1;
+const BUFFER: usize = 2048;
+
+type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
+
+/// What the scripted radio hears.
+const AIR: &[OnAir] = &[OnAir {
+    ssid: "quill-test",
+    password: Some("correct horse"),
+    signal_dbm: -50,
+}];
+
+#[riscv_rt::entry]
+fn main() -> ! {
+    let devices = virt::start();
+    let tick = executor::start_servo_executor();
+    executor::run(|spawner| {
+        // Every task is spawned once, and its storage is its own.
+        let started = devices.and_then(|devices| {
+            spawner.spawn(records(devices.recorder).ok()?);
+            spawner.spawn(host_lines(devices.lines).ok()?);
+            spawner.spawn(boot(spawner, tick, devices.card, devices.disk).ok()?);
+            Some(())
+        });
+        if started.is_none() {
+            log::error!("a device is missing");
+            virt::power::exit(virt::power::PANIC_STATUS);
+        }
+    })
+}
+
+/// Reads the settings, then starts everything else.
+#[embassy_executor::task]
+async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtNet, disk: Flash) {
+    let Some(mut memory) = Memory::new(disk, SETTINGS) else {
+        log::error!("the settings do not lie in whole pages");
+        return;
+    };
+    let settings = memory.load().await;
+    let identity = Identity { mac: card.address() };
+    static HOUSE: StaticCell<House> = StaticCell::new();
+    let house = HOUSE.init(House::new(ArmData::default(), settings, identity, virt::VITALS));
+    if start(spawner, tick, house, memory, card).is_err() {
+        log::error!("a task does not fit");
+    }
+}
+
+fn start(
+    spawner: Spawner,
+    tick: embassy_executor::SendSpawner,
+    house: &'static House,
+    memory: Memory<Flash>,
+    card: VirtNet,
+) -> Result<(), SpawnError> {
+    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
+    static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; CONNECTIONS]> =
+        ConstStaticCell::new([const { Buffers::new() }; _]);
+    static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
+
+    tick.spawn(servo_tick(house)?);
+    spawner.spawn(storage(house, memory)?);
+    spawner.spawn(light(house)?);
+    spawner.spawn(button(house)?);
+    spawner.spawn(wifi(house)?);
+    let resources = RESOURCES.init(StackResources::new());
+    let (stack, runner) = embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
+    spawner.spawn(network(runner)?);
+    spawner.spawn(tell_address(stack)?);
+    let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
+    for client in (0..).map_while(Client::new) {
+        spawner.spawn(worker(tcp, client, house)?);
+    }
+    spawner.spawn(doorman(tcp)?);
+    Ok(())
+}
+
+static SERVER: Server = Server::new();
+
+fn here() -> SocketAddr {
+    SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), PORT)
+}
+
+#[embassy_executor::task(pool_size = MAX_CLIENTS)]
+async fn worker(tcp: Connections, client: Client, house: &'static House) {
+    if let Ok(acceptor) = tcp.bind(here()).await {
+        SERVER.work(&acceptor, client, house).await;
+    }
+}
+
+#[embassy_executor::task]
+async fn doorman(tcp: Connections) {
+    if let Ok(acceptor) = tcp.bind(here()).await {
+        SERVER.turn_away(&acceptor).await;
+    }
+}
+
+#[embassy_executor::task]
+async fn servo_tick(house: &'static House) {
+    house.arm.tick(Servos::default(), TimedFrames::every(FRAME), FRAME).await;
+}
+
+#[embassy_executor::task]
+async fn storage(house: &'static House, memory: Memory<Flash>) {
+    house.store.run(memory).await;
+}
+
+#[embassy_executor::task]
+async fn light(house: &'static House) {
+    house.panel.shine(Light::default()).await;
+}
+
+#[embassy_executor::task]
+async fn button(house: &'static House) {
+    house.panel.watch(Button::new()).await;
+}
+
+#[embassy_executor::task]
+async fn wifi(house: &'static House) {
+    static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+    house.wifi.run(ScriptedRadio::new(AIR, &CUT), Wired, &house.panel).await;
+}
+
+#[embassy_executor::task]
+async fn network(mut runner: Runner<'static, VirtNet>) {
+    runner.run().await;
+}
+
+#[embassy_executor::task]
+async fn tell_address(stack: Stack<'static>) {
+    stack.wait_config_up().await;
+    if let Some(config) = stack.config_v4() {
+        log::info!("Line-us clients: {}:{}", config.address.address(), PORT);
+    }
+}
+
+#[embassy_executor::task]
+async fn records(recorder: Recorder) {
+    recorder.run().await;
+}
+
+#[embassy_executor::task]
+async fn host_lines(lines: Lines) {
+    lines.run().await;
+}
