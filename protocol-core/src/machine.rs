@@ -201,6 +201,8 @@ pub struct Machine {
     position: Position,
     /// The last move ended short of its target.
     short: bool,
+    /// A move has ended short of its target since the last frame.
+    passed_short: bool,
     /// Until when everything that happened is in the fields above.
     clock: Micros,
     active: Option<Active>,
@@ -224,6 +226,7 @@ impl Machine {
             steps: DEFAULT_STEPS,
             position: HOME,
             short: false,
+            passed_short: false,
             clock: Micros::default(),
             active: None,
             waiting: Deque::new(),
@@ -247,6 +250,8 @@ impl Machine {
     /// [`Self::next_report`] later. A client's next errand replaces one of its own that waits.
     pub fn take(&mut self, client: Client, errand: Errand) -> Option<Report> {
         self.waiting.retain(|(other, _)| *other != client);
+        // A move to where the arm is has ended when it began.
+        self.advance(self.clock);
         if self.active.is_none() && self.waiting.is_empty() && self.resting_for.is_none() {
             return Some(self.begin(client, errand));
         }
@@ -286,6 +291,7 @@ impl Machine {
                     self.clock = active.ends;
                     self.position = active.motion.end();
                     self.short = active.short;
+                    self.passed_short |= active.short;
                     self.active = None;
                 }
                 Some(_) => return,
@@ -333,9 +339,10 @@ impl Machine {
         self.last = SetPoint {
             position,
             pulses: self.pulses(position),
-            held,
+            held: held || self.passed_short,
             moving: was_moving || self.active.is_some(),
         };
+        self.passed_short = false;
         self.last
     }
 
@@ -586,6 +593,17 @@ mod tests {
     }
 
     #[test]
+    fn a_move_to_where_the_arm_is_takes_no_time() {
+        let mut machine = arm();
+        for _ in 0..3 {
+            assert_eq!(
+                machine.take(A, line(1000, 1000, 1000)),
+                Some(moving(1000, 1000, 1000))
+            );
+        }
+    }
+
+    #[test]
     fn corners_are_reached_exactly() {
         let mut machine = arm();
         machine.take(A, line(1100, 1000, 1000));
@@ -631,6 +649,17 @@ mod tests {
         assert_eq!(limited, Some(Limited::Target { lifted: true }));
         let last = run(&mut machine, 0, 2000);
         assert!(last.held && last.position == end);
+    }
+
+    #[test]
+    fn a_short_end_is_marked_also_when_the_next_move_follows_at_once() {
+        let mut machine = arm();
+        machine.take(A, line(2500, 1000, 1000));
+        machine.take(A, line(1000, 1000, 1000));
+        let marked = (0..400)
+            .filter(|at| machine.tick(Micros::new(at * 10_000)).held)
+            .count();
+        assert_eq!(marked, 1);
     }
 
     #[test]

@@ -43,6 +43,7 @@ fn follow(
     line_us: std::net::SocketAddr,
     typed: &std::sync::mpsc::Receiver<String>,
 ) -> Result<()> {
+    let mut shown = [[0; 3]; 2];
     while !STOP.load(Ordering::Relaxed) {
         if let Some(line) = emulator.next_line(Duration::from_millis(50))? {
             println!("{line}");
@@ -56,12 +57,14 @@ fn follow(
         for record in emulator.records()? {
             match record {
                 Record::Frame(frame) => servos.write(frame.time, &frame.set_point),
-                Record::Light {
-                    colour: [red, green, blue],
-                    ..
-                } => {
+                // A flashing light changes between two colours: only a third one is news.
+                Record::Light { colour, .. } if !shown.contains(&colour) => {
+                    let [red, green, blue] = colour;
                     println!("light: #{red:02x}{green:02x}{blue:02x}");
+                    let [_, before] = shown;
+                    shown = [before, colour];
                 }
+                Record::Light { .. } => {}
                 Record::Lost(count) => println!("{count} records were lost: the picture has gaps"),
             }
         }

@@ -29,7 +29,7 @@ type Flash = BlockingAsync<FileFlash>;
 ///
 /// Point any Line-us program at the address it prints, and watch the picture appear.
 #[derive(Parser)]
-#[command(version, args_conflicts_with_subcommands = true)]
+#[command(name = "quill", version, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

@@ -35,10 +35,12 @@ fn main() -> ! {
 #[embassy_executor::task]
 async fn boot(spawner: Spawner, card: VirtNet) {
     static RESOURCES: StaticCell<StackResources<3>> = StaticCell::new();
-    static BUFFERS: ConstStaticCell<[Buffers<2048, 2048>; 1]> = ConstStaticCell::new([Buffers::new()]);
+    static BUFFERS: ConstStaticCell<[Buffers<2048, 2048>; 1]> =
+        ConstStaticCell::new([Buffers::new()]);
     static POOL: StaticCell<Pool<1, 2048, 2048>> = StaticCell::new();
     let resources = RESOURCES.init(StackResources::new());
-    let (stack, runner) = embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
+    let (stack, runner) =
+        embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
     if let (Ok(network), Ok(echo)) = (network(runner), echo(tcp)) {
         spawner.spawn(network);
@@ -50,7 +52,10 @@ async fn boot(spawner: Spawner, card: VirtNet) {
 
 #[embassy_executor::task]
 async fn echo(tcp: Connections) {
-    let Ok(acceptor) = tcp.bind(SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), 1337)).await else {
+    let Ok(acceptor) = tcp
+        .bind(SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), 1337))
+        .await
+    else {
         return;
     };
     loop {

@@ -69,9 +69,16 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         return;
     };
     let settings = memory.load().await;
-    let identity = Identity { mac: card.address() };
+    let identity = Identity {
+        mac: card.address(),
+    };
     static HOUSE: StaticCell<House> = StaticCell::new();
-    let house = HOUSE.init(House::new(ArmData::default(), settings, identity, virt::VITALS));
+    let house = HOUSE.init(House::new(
+        ArmData::default(),
+        settings,
+        identity,
+        virt::VITALS,
+    ));
     if start(spawner, tick, house, memory, card).is_err() {
         log::error!("a task does not fit");
     }
@@ -95,7 +102,8 @@ fn start(
     spawner.spawn(button(house)?);
     spawner.spawn(wifi(house)?);
     let resources = RESOURCES.init(StackResources::new());
-    let (stack, runner) = embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
+    let (stack, runner) =
+        embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
     spawner.spawn(network(runner)?);
     spawner.spawn(tell_address(stack)?);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
@@ -128,7 +136,10 @@ async fn doorman(tcp: Connections) {
 
 #[embassy_executor::task]
 async fn servo_tick(house: &'static House) {
-    house.arm.tick(Servos::default(), TimedFrames::every(FRAME), FRAME).await;
+    house
+        .arm
+        .tick(Servos::default(), TimedFrames::every(FRAME), FRAME)
+        .await;
 }
 
 #[embassy_executor::task]
@@ -149,7 +160,10 @@ async fn button(house: &'static House) {
 #[embassy_executor::task]
 async fn wifi(house: &'static House) {
     static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    house.wifi.run(ScriptedRadio::new(AIR, &CUT), Wired, &house.panel).await;
+    house
+        .wifi
+        .run(ScriptedRadio::new(AIR, &CUT), Wired, &house.panel)
+        .await;
 }
 
 #[embassy_executor::task]

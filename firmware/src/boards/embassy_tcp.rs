@@ -72,7 +72,12 @@ impl<const N: usize, const RX: usize, const TX: usize> Pool<N, RX, TX> {
     }
 
     fn give_back(&self, buffers: &'static mut Buffers<RX, TX>) {
-        if let Some(place) = self.free.borrow_mut().iter_mut().find(|place| place.is_none()) {
+        if let Some(place) = self
+            .free
+            .borrow_mut()
+            .iter_mut()
+            .find(|place| place.is_none())
+        {
             *place = Some(buffers);
         }
     }
@@ -162,7 +167,11 @@ impl<const N: usize, const RX: usize, const TX: usize> edge_nal::TcpAccept for A
 
     async fn accept(&self) -> Result<(SocketAddr, Socket<N, RX, TX>), Error> {
         let mut socket = Socket::new(self.tcp)?;
-        socket.inner.accept(self.local).await.map_err(Error::Accept)?;
+        socket
+            .inner
+            .accept(self.local)
+            .await
+            .map_err(Error::Accept)?;
         let peer = socket
             .inner
             .remote_endpoint()

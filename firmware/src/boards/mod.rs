@@ -17,7 +17,10 @@ mod tests {
     #[test]
     fn the_settings_are_where_the_partition_table_says() {
         let table = include_str!("../../partitions.csv");
-        let row = table.lines().find(|line| line.starts_with("settings,")).unwrap();
+        let row = table
+            .lines()
+            .find(|line| line.starts_with("settings,"))
+            .unwrap();
         let fields: Vec<&str> = row.split(',').map(str::trim).collect();
         let number = |text: &str| u32::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
         let (start, size) = (number(fields[3]), number(fields[4]));

@@ -26,7 +26,10 @@ pub struct ScriptedRadio {
 
 impl ScriptedRadio {
     /// Hears `networks`, strongest first; `cut` ends the joined one.
-    pub const fn new(networks: &'static [OnAir], cut: &'static Signal<CriticalSectionRawMutex, ()>) -> Self {
+    pub const fn new(
+        networks: &'static [OnAir],
+        cut: &'static Signal<CriticalSectionRawMutex, ()>,
+    ) -> Self {
         Self {
             networks,
             cut,
@@ -47,7 +50,14 @@ impl Radio for ScriptedRadio {
                 None => Security::Open,
             };
             let signal_dbm = network.signal_dbm;
-            if heard.push(Heard { ssid, security, signal_dbm }).is_err() {
+            if heard
+                .push(Heard {
+                    ssid,
+                    security,
+                    signal_dbm,
+                })
+                .is_err()
+            {
                 break;
             }
         }
@@ -59,7 +69,10 @@ impl Radio for ScriptedRadio {
         let outcome = match self.networks.iter().find(known) {
             None => Joined::NotFound,
             Some(on_air) => {
-                let given = network.password.as_ref().map(|password| password.as_bytes());
+                let given = network
+                    .password
+                    .as_ref()
+                    .map(|password| password.as_bytes());
                 match given == on_air.password.map(str::as_bytes) {
                     true => Joined::Yes,
                     false => Joined::WrongPassword,

@@ -224,6 +224,9 @@ fn any_number(value: &[u8], letter: char) -> Result<(Decimal, &[u8]), WordError<
         (Some((number, rest)), false) if ends_number(rest) => return Ok((number, rest)),
         _ => {}
     }
+    if quoted && !inner.contains(&b'"') {
+        return Err(WordError::OpenQuote(letter));
+    }
     Err(match token(value) {
         None => WordError::NotUtf8,
         Some("" | "\"\"") => WordError::NoNumber(letter),
@@ -400,8 +403,7 @@ mod tests {
     #[test]
     fn numbers_that_are_none() {
         for value in [
-            "nan", "inf", "-inf", "0x10", "0X1F", "1.2.3", "--1", "1-", "\"5", "\"x\"", "1,5",
-            "\u{b2}",
+            "nan", "inf", "-inf", "0x10", "0X1F", "1.2.3", "--1", "1-", "\"x\"", "1,5", "\u{b2}",
         ] {
             assert_eq!(
                 Words::new(value.as_bytes()).number('X'),

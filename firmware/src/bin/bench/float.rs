@@ -28,12 +28,16 @@ pub fn inverse_micromath(&[x, y, _]: &[f32; 3]) -> [f32; 2] {
 pub fn set_point_libm(target: &[f32; 3]) -> Option<[f32; 3]> {
     const HOME: [f32; 3] = [1000.0; 3];
     let part = core::hint::black_box(1.0_f32);
-    let [x, y, z]: [f32; 3] = core::array::from_fn(|axis| HOME[axis] + (target[axis] - HOME[axis]) * part);
+    let [x, y, z]: [f32; 3] =
+        core::array::from_fn(|axis| HOME[axis] + (target[axis] - HOME[axis]) * part);
     let [shoulder, elbow] = inverse_libm(&[x, y, z]);
-    let inside =
-        x * x + y * y <= 1950.0 * 1950.0 && x >= if y >= 0.0 { 500.0 } else { 700.0 } && shoulder >= 10.0 && elbow >= 10.0;
+    let inside = x * x + y * y <= 1950.0 * 1950.0
+        && x >= if y >= 0.0 { 500.0 } else { 700.0 }
+        && shoulder >= 10.0
+        && elbow >= 10.0;
     let pen = 135.0 - 45.0 * (1000.0 - z) / 1000.0;
     let offsets = core::hint::black_box(&CALIBRATION);
     let angles = [shoulder, elbow, pen];
-    inside.then(|| core::array::from_fn(|servo| PULSE.0 + (angles[servo] + offsets[servo]) * PULSE.1))
+    inside
+        .then(|| core::array::from_fn(|servo| PULSE.0 + (angles[servo] + offsets[servo]) * PULSE.1))
 }

@@ -2,8 +2,8 @@
 
 use core::hint::black_box;
 
+use firmware::boards::virt::{console, power};
 use riscv::register::minstret;
-use virt_board::{console, power};
 
 /// Instructions of `work(input)`, the call itself and the reading of the counter included.
 #[inline(never)]
@@ -20,8 +20,11 @@ fn nothing<A>(_input: &A) {}
 
 /// Prints the mean cost of `work` over `inputs`, less that of a call that does nothing.
 pub fn report<A, R>(name: &str, inputs: &[A], work: fn(&A) -> R) {
-    let total: u32 = inputs.iter().map(|input| raw(work, input) - raw(nothing, input)).sum();
-    console::write_unlocked(format_args!("{name},{}\n", total / inputs.len() as u32));
+    let total: u32 = inputs
+        .iter()
+        .map(|input| raw(work, input) - raw(nothing, input))
+        .sum();
+    console::write_unlocked(format_args!("{name};{}\n", total / inputs.len() as u32));
 }
 
 /// Ends the run with a status when what was measured does not do its work.

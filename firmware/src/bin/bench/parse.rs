@@ -9,7 +9,8 @@ use core::{
 
 use async_gcode::{GCode, Literal, Parser, RealValue};
 use gcode::core::{
-    BlockVisitor, CommandVisitor, ControlFlow, Diagnostics, HasDiagnostics, Noop, Number, ProgramVisitor, Span, Value,
+    BlockVisitor, CommandVisitor, ControlFlow, Diagnostics, HasDiagnostics, Noop, Number,
+    ProgramVisitor, Span, Value,
 };
 
 /// G number and x, y, z.
@@ -99,7 +100,10 @@ pub fn with_async_gcode(text: &&str) -> Option<Move> {
     let mut cx = Context::from_waker(Waker::noop());
     loop {
         match pin!(parser.next()).poll(&mut cx) {
-            Poll::Ready(Some(Ok(GCode::Word(letter, RealValue::Literal(Literal::RealNumber(value)))))) => match axis(letter) {
+            Poll::Ready(Some(Ok(GCode::Word(
+                letter,
+                RealValue::Literal(Literal::RealNumber(value)),
+            )))) => match axis(letter) {
                 Some(axis) => axes[axis] = value as f32,
                 None => number = Some(value as u32),
             },

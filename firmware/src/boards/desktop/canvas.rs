@@ -136,7 +136,7 @@ fn outline() -> Vec<Point> {
         (1320.0, -1460.0),
     ]
     .map(nearest);
-    let mut rays: Vec<f64> = (-180..180)
+    let mut rays: Vec<f64> = (-179..180)
         .map(|degrees| f64::from(degrees).to_radians())
         .collect();
     rays.extend(corners.map(|(x, y)| (y - EYE.1).atan2(x - EYE.0)));

@@ -1,9 +1,18 @@
-//! The desktop's sockets, without Nagle's delay: each reply leaves at once, in its own segment.
+//! The desktop's sockets, without Nagle's delay: each reply leaves at once, in its own segment. A client
+//! that has vanished without a word is noticed by keep-alive probes.
 
 use core::net::SocketAddr;
 use edge_nal::{TcpAccept, TcpBind};
 use edge_nal_std::{Stack, TcpAcceptor, TcpSocket};
+use socket2::{SockRef, TcpKeepalive};
 use std::io;
+use std::time::Duration;
+
+/// A silent client is asked for a sign of life after 10 s, and given up after three questions more.
+const KEEP_ALIVE: TcpKeepalive = TcpKeepalive::new()
+    .with_time(Duration::from_secs(10))
+    .with_interval(Duration::from_secs(5))
+    .with_retries(3);
 
 /// Listens on one address.
 pub struct Listener(TcpAcceptor);
@@ -24,7 +33,9 @@ impl TcpAccept for Listener {
 
     async fn accept(&self) -> io::Result<(SocketAddr, TcpSocket)> {
         let (peer, socket) = self.0.accept().await?;
-        socket.get_ref().set_nodelay(true)?;
+        let options = SockRef::from(socket.get_ref());
+        options.set_tcp_nodelay(true)?;
+        options.set_tcp_keepalive(&KEEP_ALIVE)?;
         Ok((peer, socket))
     }
 }

@@ -222,7 +222,7 @@ impl Recording {
         if drawn.strokes > 0 && finished {
             self.reported = self.totals;
             log::info!(
-                "drawing finished: {} strokes, {:.0} mm of ink, {:.0} mm of travel, {:.1} s in motion",
+                "drawing finished: {} stroke(s), {:.0} mm of ink, {:.0} mm of travel, {:.1} s in motion",
                 drawn.strokes,
                 drawn.pen_down_mm,
                 drawn.pen_up_mm,

@@ -9,9 +9,19 @@ use crate::boards::virt::{map, mmio::Register};
 // SAFETY: addresses of the CLINT of the virt machine.
 const MSIP: Register = unsafe { Register::at(map::CLINT) };
 // SAFETY: as above.
-const MTIMECMP: [Register; 2] = unsafe { [Register::at(map::CLINT + 0x4000), Register::at(map::CLINT + 0x4004)] };
+const MTIMECMP: [Register; 2] = unsafe {
+    [
+        Register::at(map::CLINT + 0x4000),
+        Register::at(map::CLINT + 0x4004),
+    ]
+};
 // SAFETY: as above.
-const MTIME: [Register; 2] = unsafe { [Register::at(map::CLINT + 0xbff8), Register::at(map::CLINT + 0xbffc)] };
+const MTIME: [Register; 2] = unsafe {
+    [
+        Register::at(map::CLINT + 0xbff8),
+        Register::at(map::CLINT + 0xbffc),
+    ]
+};
 
 /// Ticks of [`map::MTIME_HZ`] since power-up.
 pub fn mtime() -> u64 {

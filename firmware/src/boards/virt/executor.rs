@@ -56,7 +56,8 @@ pub(crate) fn on_software_interrupt() {
 
 /// Runs the thread executor for ever; `start` spawns its first tasks.
 pub fn run(start: impl FnOnce(Spawner)) -> ! {
-    let executor: &'static raw::Executor = THREAD.init_with(|| raw::Executor::new(core::ptr::null_mut()));
+    let executor: &'static raw::Executor =
+        THREAD.init_with(|| raw::Executor::new(core::ptr::null_mut()));
     start(executor.spawner());
     loop {
         // SAFETY: polled only here, and this function never returns and can be entered once (`StaticCell`).
@@ -80,13 +81,18 @@ pub fn run(start: impl FnOnce(Spawner)) -> ! {
 /// Leaves out what was counted since `before`. Interrupts are masked.
 fn leave_out(before: u32) {
     let spent = (minstret::read() as u32).wrapping_sub(before);
-    LEFT_OUT.store(LEFT_OUT.load(Ordering::Relaxed).wrapping_add(spent), Ordering::Relaxed);
+    LEFT_OUT.store(
+        LEFT_OUT.load(Ordering::Relaxed).wrapping_add(spent),
+        Ordering::Relaxed,
+    );
 }
 
 /// Instructions executed since power-up, modulo 2^32, without sleep and servo ticks: the difference of
 /// two readings under `-icount shift=0` is exact. QEMU's `minstret` goes on while the core sleeps.
 pub fn instructions() -> u32 {
-    critical_section::with(|_| (minstret::read() as u32).wrapping_sub(LEFT_OUT.load(Ordering::Relaxed)))
+    critical_section::with(|_| {
+        (minstret::read() as u32).wrapping_sub(LEFT_OUT.load(Ordering::Relaxed))
+    })
 }
 
 /// Whether the interrupt that runs now found the core asleep. Then its delay is the emulator's own, which oversleeps by as

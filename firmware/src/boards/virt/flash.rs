@@ -137,10 +137,19 @@ impl Flash {
 
     /// Starts a request on the first `length` bytes of the transfer buffer and waits for its end. A future dropped on the way
     /// leaves the request running; the next one waits for it first.
-    async fn request(&mut self, direction: Direction, first: usize, length: usize) -> Result<(), Error> {
+    async fn request(
+        &mut self,
+        direction: Direction,
+        first: usize,
+        length: usize,
+    ) -> Result<(), Error> {
         // How the one before ended was its own caller's business.
         let _ = self.finish().await;
-        let Transfer { request, response, data } = &mut *self.transfer;
+        let Transfer {
+            request,
+            response,
+            data,
+        } = &mut *self.transfer;
         let data = &mut data[..length];
         // SAFETY: the transfer lives for ever, and nothing touches it while `pending` says that a request runs.
         let token = unsafe {
@@ -177,13 +186,21 @@ impl Flash {
         })
         .await;
         self.pending = None;
-        let Transfer { request, response, data } = &mut *self.transfer;
+        let Transfer {
+            request,
+            response,
+            data,
+        } = &mut *self.transfer;
         let data = &mut data[..length];
         // SAFETY: the very buffers that the request was started with.
         unsafe {
             match direction {
-                Direction::Read => self.disk.complete_read_blocks(token, request, data, response),
-                Direction::Write => self.disk.complete_write_blocks(token, request, data, response),
+                Direction::Read => self
+                    .disk
+                    .complete_read_blocks(token, request, data, response),
+                Direction::Write => self
+                    .disk
+                    .complete_write_blocks(token, request, data, response),
             }
         }?;
         Ok(())
@@ -202,7 +219,8 @@ impl ReadNorFlash for Flash {
         let (mut offset, mut rest) = (offset as usize, bytes);
         while !rest.is_empty() {
             let piece = Piece::first_of(offset, rest.len());
-            self.request(Direction::Read, piece.first, piece.whole).await?;
+            self.request(Direction::Read, piece.first, piece.whole)
+                .await?;
             let (now, later) = rest.split_at_mut(piece.length);
             now.copy_from_slice(&self.transfer.data[piece.skip..][..piece.length]);
             offset += piece.length;
@@ -228,7 +246,8 @@ impl NorFlash for Flash {
             // Before the buffer may be filled, a request that was abandoned must have let go of it.
             let _ = self.finish().await;
             self.transfer.data.fill(0xff);
-            self.request(Direction::Write, offset as usize / SECTOR_SIZE, SECTOR).await?;
+            self.request(Direction::Write, offset as usize / SECTOR_SIZE, SECTOR)
+                .await?;
         }
         Ok(())
     }
@@ -238,14 +257,20 @@ impl NorFlash for Flash {
         let (mut offset, mut rest) = (offset as usize, bytes);
         while !rest.is_empty() {
             let piece = Piece::first_of(offset, rest.len());
-            self.request(Direction::Read, piece.first, piece.whole).await?;
+            self.request(Direction::Read, piece.first, piece.whole)
+                .await?;
             let (now, later) = rest.split_at(piece.length);
             let stored = &mut self.transfer.data[piece.skip..][..piece.length];
-            if let Some(at) = stored.iter().zip(now).position(|(old, new)| new & !old != 0) {
+            if let Some(at) = stored
+                .iter()
+                .zip(now)
+                .position(|(old, new)| new & !old != 0)
+            {
                 return Err(Error::NotErased((offset + at) as u32));
             }
             stored.copy_from_slice(now);
-            self.request(Direction::Write, piece.first, piece.whole).await?;
+            self.request(Direction::Write, piece.first, piece.whole)
+                .await?;
             offset += piece.length;
             rest = later;
         }

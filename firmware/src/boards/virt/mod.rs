@@ -31,13 +31,17 @@ pub const VITALS: Vitals = Vitals {
     last_panic: "",
 };
 
-/// There is no heap: what is free is what lies between the program and the top of its memory, of which
-/// the stack takes a part.
+/// There is no heap: what is free is what lies between the variables and the stack.
+#[allow(unsafe_code)]
 fn free_memory() -> u32 {
-    const TOP: u32 = 0x8000_0000 + 8 * 1024 * 1024;
+    unsafe extern "C" {
+        /// The end of the variables (`link.x`); only its address means something.
+        static __ebss: u8;
+    }
     // The stack grows down from the top; a local variable tells how far.
     let here = 0_u8;
-    TOP.min(core::ptr::from_ref(&here).addr() as u32) - 0x8000_0000
+    let stack = core::ptr::from_ref(&here).addr();
+    stack.saturating_sub((&raw const __ebss).addr()) as u32
 }
 
 /// The devices of a complete machine.
@@ -62,7 +66,9 @@ pub fn start() -> Option<Devices> {
         match device.kind() {
             DeviceType::Network => card = Some(net::VirtNet::new(device)),
             DeviceType::Block => disk = Some(flash::Flash::new(device)),
-            DeviceType::Console if recorder.is_none() => recorder = Some(world::Recorder::new(device)),
+            DeviceType::Console if recorder.is_none() => {
+                recorder = Some(world::Recorder::new(device))
+            }
             DeviceType::Console => {
                 console::attach(&device);
                 lines = Some(world::Lines::new(device));

@@ -80,7 +80,10 @@ impl VirtNet {
     /// # Panics
     /// When the device refuses, or when called twice.
     pub fn new(device: Device) -> Self {
-        let Device { slot, mut transport } = device;
+        let Device {
+            slot,
+            mut transport,
+        } = device;
         transport.begin_init(Features::MAC | Features::VERSION_1);
         let address = transport
             .read_config_space(0)
@@ -118,7 +121,8 @@ impl Receiver {
     /// Gives buffer `n` to the device.
     fn offer(&mut self, transport: &mut Transport, n: usize) {
         // SAFETY: the buffer lives for ever and is not touched until `take` has it back.
-        let token = unsafe { self.queue.add(&[], &mut [&mut self.buffers[n]]) }.expect("as many descriptors as buffers");
+        let token = unsafe { self.queue.add(&[], &mut [&mut self.buffers[n]]) }
+            .expect("as many descriptors as buffers");
         self.held[usize::from(token)] = n as u8;
         if self.queue.should_notify() {
             transport.notify(RECEIVE);
@@ -129,7 +133,8 @@ impl Receiver {
     fn take(&mut self, token: u16) -> (usize, usize) {
         let n = usize::from(self.held[usize::from(token)]);
         // SAFETY: the very buffer that was added with this token.
-        let written = unsafe { self.queue.pop_used(token, &[], &mut [&mut self.buffers[n]]) }.expect("it was just peeked");
+        let written = unsafe { self.queue.pop_used(token, &[], &mut [&mut self.buffers[n]]) }
+            .expect("it was just peeked");
         (n, (written as usize).saturating_sub(HEADER).min(FRAME))
     }
 }
@@ -196,7 +201,8 @@ impl TxToken for Sendable<'_> {
         let buffer = &mut sender.buffers[n][..whole];
         let result = f(&mut buffer[HEADER..]);
         // SAFETY: the buffer lives for ever and is not touched until `reclaim` has it back.
-        let token = unsafe { sender.queue.add(&[buffer], &mut []) }.expect("as many descriptors as buffers");
+        let token = unsafe { sender.queue.add(&[buffer], &mut []) }
+            .expect("as many descriptors as buffers");
         sender.free &= !(1 << n);
         sender.held[usize::from(token)] = (n as u8, whole as u16);
         if sender.queue.should_notify() {

@@ -44,7 +44,10 @@ unsafe impl Hal for BoardHal {
         };
         // SAFETY: `first` is within the arena.
         let page = unsafe { ARENA.0.get().cast::<u8>().add(first * PAGE_SIZE) };
-        (page.addr() as PhysAddr, NonNull::new(page).expect("inside a static"))
+        (
+            page.addr() as PhysAddr,
+            NonNull::new(page).expect("inside a static"),
+        )
     }
 
     unsafe fn dma_dealloc(_paddr: PhysAddr, _vaddr: NonNull<u8>, _pages: usize) -> i32 {

@@ -70,7 +70,9 @@ impl Device {
 pub unsafe fn devices() -> impl Iterator<Item = Device> {
     (0..map::VIRTIO_SLOTS).filter_map(|n| {
         let slot = Slot(n);
-        let header = NonNull::new(core::ptr::without_provenance_mut::<VirtIOHeader>(slot.base()))?;
+        let header = NonNull::new(core::ptr::without_provenance_mut::<VirtIOHeader>(
+            slot.base(),
+        ))?;
         // SAFETY: a slot of the virt machine, there for ever; the caller sees to it that it is taken once. This module
         // itself touches only the two interrupt registers, which the drivers of this board leave alone.
         let transport = unsafe { MmioTransport::new(header, map::VIRTIO_STEP) }.ok()?;

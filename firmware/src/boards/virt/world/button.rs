@@ -20,7 +20,10 @@ static WAKER: AtomicWaker = AtomicWaker::new();
 pub(super) fn set(pressed: bool) {
     if pressed != PRESSED.load(Ordering::Relaxed) {
         PRESSED.store(pressed, Ordering::Relaxed);
-        EDGES.store(EDGES.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        EDGES.store(
+            EDGES.load(Ordering::Relaxed).wrapping_add(1),
+            Ordering::Relaxed,
+        );
         WAKER.wake();
     }
 }
@@ -42,13 +45,18 @@ impl Button {
     async fn until(&mut self, ready: impl Fn(&mut Self) -> bool) {
         poll_fn(|cx| {
             WAKER.register(cx.waker());
-            if ready(self) { Poll::Ready(()) } else { Poll::Pending }
+            if ready(self) {
+                Poll::Ready(())
+            } else {
+                Poll::Pending
+            }
         })
         .await;
     }
 
     async fn until_level(&mut self, pressed: bool) {
-        self.until(|_| PRESSED.load(Ordering::Relaxed) == pressed).await;
+        self.until(|_| PRESSED.load(Ordering::Relaxed) == pressed)
+            .await;
         self.seen = EDGES.load(Ordering::Relaxed);
     }
 
@@ -64,7 +72,8 @@ impl Button {
 
     /// Waits for at least one edge since the last wait; returns how many.
     async fn next_edges(&mut self) -> u32 {
-        self.until(|button| EDGES.load(Ordering::Relaxed) != button.seen).await;
+        self.until(|button| EDGES.load(Ordering::Relaxed) != button.seen)
+            .await;
         let edges = EDGES.load(Ordering::Relaxed);
         edges.wrapping_sub(core::mem::replace(&mut self.seen, edges))
     }

@@ -27,7 +27,11 @@ bitflags! {
 pub async fn used(slot: Slot, queue: &Queue) {
     poll_fn(|cx| {
         slot.waker().register(cx.waker());
-        if queue.can_pop() { Poll::Ready(()) } else { Poll::Pending }
+        if queue.can_pop() {
+            Poll::Ready(())
+        } else {
+            Poll::Pending
+        }
     })
     .await;
 }

@@ -30,12 +30,19 @@ impl Lines {
     /// # Panics
     /// When the device refuses.
     pub fn new(device: Device) -> Self {
-        let Device { slot, mut transport } = device;
+        let Device {
+            slot,
+            mut transport,
+        } = device;
         transport.begin_init(Features::VERSION_1);
         let queue = Queue::new(&mut transport, RECEIVE, false, false).expect("virtio-console");
         transport.finish_init();
         slot.enable_interrupt();
-        Self { slot, transport, queue }
+        Self {
+            slot,
+            transport,
+            queue,
+        }
     }
 
     /// Takes lines for ever.
@@ -57,7 +64,8 @@ impl Lines {
             transport.notify(RECEIVE);
             used(slot, &queue).await;
             // SAFETY: the very buffer that was added.
-            let received = unsafe { queue.pop_used(token, &[], &mut [buffer]) }.expect("only one was added");
+            let received =
+                unsafe { queue.pop_used(token, &[], &mut [buffer]) }.expect("only one was added");
             for &byte in &buffer[..(received as usize).min(BATCH)] {
                 if byte == b'\n' {
                     on_line(&line);

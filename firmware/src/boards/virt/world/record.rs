@@ -98,8 +98,14 @@ fn encode(record: &Record, buffer: &mut [u8]) -> usize {
         Record::Servo(frame) => {
             put(b"S");
             put(&frame.time_us.to_le_bytes());
-            frame.position.iter().for_each(|axis| put(&axis.to_le_bytes()));
-            frame.pulses.iter().for_each(|pulse| put(&pulse.to_le_bytes()));
+            frame
+                .position
+                .iter()
+                .for_each(|axis| put(&axis.to_le_bytes()));
+            frame
+                .pulses
+                .iter()
+                .for_each(|pulse| put(&pulse.to_le_bytes()));
             put(&frame.late_us.to_le_bytes());
             put(&[frame.flags]);
         }

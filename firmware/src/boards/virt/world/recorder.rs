@@ -32,12 +32,19 @@ impl Recorder {
     /// # Panics
     /// When the device refuses.
     pub fn new(device: Device) -> Self {
-        let Device { slot, mut transport } = device;
+        let Device {
+            slot,
+            mut transport,
+        } = device;
         transport.begin_init(Features::VERSION_1);
         let queue = Queue::new(&mut transport, TRANSMIT, false, false).expect("virtio-console");
         transport.finish_init();
         slot.enable_interrupt();
-        Self { slot, transport, queue }
+        Self {
+            slot,
+            transport,
+            queue,
+        }
     }
 
     /// Carries records for ever.
@@ -55,11 +62,13 @@ impl Recorder {
             let length = record::next_batch(buffer).await;
             // SAFETY: the buffer lives for ever, and nothing touches it until it is popped; were this future dropped, it would
             // stay taken.
-            let token = unsafe { queue.add(&[&buffer[..length]], &mut []) }.expect("one buffer at a time");
+            let token =
+                unsafe { queue.add(&[&buffer[..length]], &mut []) }.expect("one buffer at a time");
             transport.notify(TRANSMIT);
             used(slot, &queue).await;
             // SAFETY: the very bytes that were added.
-            unsafe { queue.pop_used(token, &[&buffer[..length]], &mut []) }.expect("only one was added");
+            unsafe { queue.pop_used(token, &[&buffer[..length]], &mut []) }
+                .expect("only one was added");
         }
     }
 }

@@ -23,14 +23,25 @@ impl board::Servos for Servos {
         });
         let late = now.saturating_duration_since(due).as_micros();
         self.last = Some((due, time));
-        let position = [set_point.position.x, set_point.position.y, set_point.position.z];
-        let flags = [set_point.held, set_point.moving, executor::woken_from_sleep()];
+        let position = [
+            set_point.position.x,
+            set_point.position.y,
+            set_point.position.z,
+        ];
+        let flags = [
+            set_point.held,
+            set_point.moving,
+            executor::woken_from_sleep(),
+        ];
         record(Record::Servo(Frame {
             time_us: time.get(),
             position: position.map(|coordinate| coordinate.bits()),
             pulses: set_point.pulses.map(|pulse| pulse.get()),
             late_us: u32::try_from(late).unwrap_or(u32::MAX),
-            flags: flags.iter().rev().fold(0, |flags, flag| flags << 1 | u8::from(*flag)),
+            flags: flags
+                .iter()
+                .rev()
+                .fold(0, |flags, flag| flags << 1 | u8::from(*flag)),
         }));
     }
 }
