@@ -123,11 +123,11 @@ fn run_bench(program: &Path) -> Result<Vec<(String, u64)>> {
     Ok(measured)
 }
 
-/// Instructions from one command to the next over TCP in steady state, everything included: the mean of
-/// many, the machine's idle time taken out.
+/// Instructions from one command's packet to its reply's, everything included: the mean of many, each
+/// from rest, less what the machine does meanwhile without a command.
 fn round_trip(program: &Path) -> Result<u64> {
-    const WARM_UP: u32 = 20;
-    const COUNT: u32 = 200;
+    const WARM_UP: u32 = 10;
+    const COUNT: u32 = 100;
     let folder = tempfile::tempdir()?;
     let options = Options {
         line_us: free_address()?,
@@ -139,26 +139,31 @@ fn round_trip(program: &Path) -> Result<u64> {
     let mut client = TcpStream::connect(options.line_us)?;
     client.set_nodelay(true)?;
     client.set_read_timeout(Some(Duration::from_secs(20)))?;
-    let mut exchange = |count: u32| -> Result<()> {
-        for number in 0..count {
-            // Two places in turn, so that there is always a way to go.
-            let x = 1234 + (number % 2);
-            client.write_all(format!("G01 X{x} Y-567 Z1000\n").as_bytes())?;
-            let mut reply = [0; 256];
-            ensure!(
-                client.read(&mut reply)? > 0,
-                "the machine closed the connection"
-            );
-            // The step is over when the next one comes, as with a client that draws.
-            std::thread::sleep(Duration::from_millis(2));
-        }
+    let mut exchange = |number: u32| -> Result<()> {
+        // Two places in turn, a step apart, so that there is always a way to go.
+        let x = 1234 + (number % 2);
+        client.write_all(format!("G01 X{x} Y-567 Z1000\n").as_bytes())?;
+        let mut reply = [0; 256];
+        ensure!(
+            client.read(&mut reply)? > 0,
+            "the machine closed the connection"
+        );
         Ok(())
     };
-    exchange(WARM_UP)?;
-    let before = instructions(&mut emulator)?;
-    exchange(COUNT)?;
-    let after = instructions(&mut emulator)?;
-    Ok(u64::from(after.wrapping_sub(before) / COUNT))
+    let mut times = |count: u32, work: &mut dyn FnMut(u32) -> Result<()>| -> Result<u64> {
+        let before = instructions(&mut emulator)?;
+        for number in 0..count {
+            work(number)?;
+            // A step takes 10 ms and begins at a frame.
+            std::thread::sleep(Duration::from_millis(25));
+        }
+        let after = instructions(&mut emulator)?;
+        Ok(u64::from(after.wrapping_sub(before)))
+    };
+    times(WARM_UP, &mut exchange)?;
+    let busy = times(COUNT, &mut exchange)?;
+    let idle = times(COUNT, &mut |_| Ok(()))?;
+    Ok(busy.saturating_sub(idle) / u64::from(COUNT))
 }
 
 /// Asks the machine how many instructions it has executed, sleep not counted, modulo 2^32.

@@ -13,7 +13,10 @@ use firmware::boards::virt::world::{Lines, Recorder};
 use firmware::boards::virt::{self, executor};
 use static_cell::{ConstStaticCell, StaticCell};
 
-type Connections = Tcp<1, 2048, 2048>;
+/// As many as the firmware has: the stack looks through all of them at each packet.
+const CONNECTIONS: usize = 5;
+
+type Connections = Tcp<CONNECTIONS, 2048, 2048>;
 
 #[riscv_rt::entry]
 fn main() -> ! {
@@ -34,23 +37,25 @@ fn main() -> ! {
 
 #[embassy_executor::task]
 async fn boot(spawner: Spawner, card: VirtNet) {
-    static RESOURCES: StaticCell<StackResources<3>> = StaticCell::new();
-    static BUFFERS: ConstStaticCell<[Buffers<2048, 2048>; 1]> =
-        ConstStaticCell::new([Buffers::new()]);
-    static POOL: StaticCell<Pool<1, 2048, 2048>> = StaticCell::new();
+    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
+    static BUFFERS: ConstStaticCell<[Buffers<2048, 2048>; CONNECTIONS]> =
+        ConstStaticCell::new([const { Buffers::new() }; _]);
+    static POOL: StaticCell<Pool<CONNECTIONS, 2048, 2048>> = StaticCell::new();
     let resources = RESOURCES.init(StackResources::new());
     let (stack, runner) =
         embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
-    if let (Ok(network), Ok(echo)) = (network(runner), echo(tcp)) {
+    if let Ok(network) = network(runner) {
         spawner.spawn(network);
+    }
+    for echo in (0..CONNECTIONS).filter_map(|_| echo(tcp).ok()) {
         spawner.spawn(echo);
     }
     stack.wait_config_up().await;
     log::info!("Line-us clients: here they hear themselves");
 }
 
-#[embassy_executor::task]
+#[embassy_executor::task(pool_size = CONNECTIONS)]
 async fn echo(tcp: Connections) {
     let Ok(acceptor) = tcp
         .bind(SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), 1337))

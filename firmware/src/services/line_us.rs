@@ -111,10 +111,14 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
-    while let Ok(length @ 1..) = answers.socket.read(&mut chunk).await {
+    while let Ok(length @ 1..) = answers.link.socket.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
-            perform(request, &mut reply, client, house).await;
+            match request {
+                // The busiest one, without a detour.
+                Request::Errand(errand) => reply.report(&house.arm.errand(client, errand).await),
+                other => perform(other, &mut reply, client, house).await,
+            }
             answers.send(&reply).await;
         }
     }
@@ -214,63 +218,73 @@ fn refuse_store(what: &str, error: &dyn Display, reply: &mut Reply) {
 
 /// The way of replies to one client: whole, in order, each in one write as long as it reads.
 struct Answers<S> {
-    socket: S,
+    link: Link<S>,
     /// The rest of a reply of which only a part went out: it comes before anything else.
     rest: heapless::Vec<u8, MAX_REPLY>,
+}
+
+impl<S: Write> Answers<S> {
+    const fn new(socket: S) -> Self {
+        Self {
+            link: Link {
+                socket,
+                slow: false,
+                gone: false,
+            },
+            rest: heapless::Vec::new(),
+        }
+    }
+
+    async fn send(&mut self, reply: &Reply) {
+        if !self.rest.is_empty() {
+            let sent = self.link.push(&self.rest).await;
+            self.rest.drain(..sent);
+            if !self.rest.is_empty() {
+                return;
+            }
+        }
+        let message = reply.as_bytes();
+        let sent = self.link.push(message).await;
+        if let Some(rest @ [_, ..]) = message.get(sent..)
+            && sent > 0
+        {
+            // It fits: no message is longer.
+            let _ = self.rest.extend_from_slice(rest);
+        }
+        // The next reply is to come in a segment of its own. A socket that fails here fails at the next
+        // write as well.
+        let _ = self.link.socket.flush().await;
+    }
+}
+
+struct Link<S> {
+    socket: S,
     /// The client does not read: no reply waits for it.
     slow: bool,
     /// The client cannot be written to any more.
     gone: bool,
 }
 
-impl<S: Write> Answers<S> {
-    const fn new(socket: S) -> Self {
-        Self {
-            socket,
-            rest: heapless::Vec::new(),
-            slow: false,
-            gone: false,
-        }
-    }
-
-    async fn send(&mut self, reply: &Reply) {
-        let rest = core::mem::take(&mut self.rest);
-        let unsent = self.push(&rest).await;
-        if unsent > 0 {
-            self.keep(&rest, unsent);
-            return;
-        }
-        let message = reply.as_bytes();
-        let unsent = self.push(message).await;
-        if unsent < message.len() {
-            self.keep(message, unsent);
-        }
-        // The next reply is to come in a segment of its own. A socket that fails here fails at the next
-        // write as well.
-        let _ = self.socket.flush().await;
-    }
-
-    fn keep(&mut self, message: &[u8], unsent: usize) {
-        let tail = message.get(message.len() - unsent..).unwrap_or_default();
-        self.rest = heapless::Vec::from_slice(tail).unwrap_or_default();
-    }
-
-    /// Writes as much of `bytes` as the client takes in time, and gives how much is left.
-    async fn push(&mut self, mut bytes: &[u8]) -> usize {
-        while !bytes.is_empty() && !self.gone {
+impl<S: Write> Link<S> {
+    /// Writes as much of `bytes` as the client takes in time, and gives how much that was.
+    async fn push(&mut self, bytes: &[u8]) -> usize {
+        let mut sent = 0;
+        while let Some(rest @ [_, ..]) = bytes.get(sent..)
+            && !self.gone
+        {
             let patience = if self.slow { Duration::MIN } else { PATIENCE };
-            match with_timeout(patience, self.socket.write(bytes)).await {
+            match with_timeout(patience, self.socket.write(rest)).await {
                 Ok(Ok(written @ 1..)) => {
-                    bytes = bytes.get(written..).unwrap_or_default();
+                    sent += written;
                     self.slow = false;
                 }
                 Ok(_) => self.gone = true,
                 Err(_) => {
                     self.slow = true;
-                    return bytes.len();
+                    break;
                 }
             }
         }
-        bytes.len()
+        sent
     }
 }
