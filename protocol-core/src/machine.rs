@@ -248,7 +248,8 @@ impl Machine {
 
     /// Takes an errand: `Some` with its report when it begins at once, else the report comes through
     /// [`Self::next_report`] later. A client's next errand replaces one of its own that waits.
-    pub fn take(&mut self, client: Client, errand: Errand) -> Option<Report> {
+    #[inline]
+    pub fn take(&mut self, client: Client, errand: &Errand) -> Option<Report> {
         self.waiting.retain(|(other, _)| *other != client);
         // A move to where the arm is has ended when it began.
         self.advance(self.clock);
@@ -256,7 +257,7 @@ impl Machine {
             return Some(self.begin(client, errand));
         }
         // One place for each client, and this client's was made free above.
-        let _ = self.waiting.push_back((client, errand));
+        let _ = self.waiting.push_back((client, *errand));
         None
     }
 
@@ -302,7 +303,7 @@ impl Machine {
                     let Some((client, errand)) = self.waiting.pop_front() else {
                         return;
                     };
-                    let report = self.begin(client, errand);
+                    let report = self.begin(client, &errand);
                     // A client has one errand at a time, so one report at a time as well.
                     let _ = self.reports.push_back((client, report));
                 }
@@ -414,12 +415,13 @@ impl Machine {
         self.calibration.apply(self.angles())
     }
 
-    fn begin(&mut self, client: Client, errand: Errand) -> Report {
+    #[inline]
+    fn begin(&mut self, client: Client, errand: &Errand) -> Report {
         match errand {
             Errand::Move(manner, target) => {
                 self.last_mover = Some(client);
                 self.lift_at = None;
-                self.start(manner, target)
+                self.start(*manner, target)
             }
             Errand::Rest => {
                 self.resting_for = Some(client);
@@ -428,7 +430,7 @@ impl Machine {
         }
     }
 
-    fn start(&mut self, manner: Manner, target: Target) -> Report {
+    fn start(&mut self, manner: Manner, target: &Target) -> Report {
         let (end, mut limited) = self.reachable(target);
         let motion = match manner {
             Manner::Straight => Motion::Line(Line::new(self.position, end, self.steps)),
@@ -452,7 +454,8 @@ impl Machine {
     }
 
     /// The target itself with Z limited, or the closest point of the drawing area with the pen up.
-    fn reachable(&self, target: Target) -> (Position, Option<Limited>) {
+    #[inline]
+    fn reachable(&self, target: &Target) -> (Position, Option<Limited>) {
         let x = target.x.unwrap_or(self.position.x.into());
         let y = target.y.unwrap_or(self.position.y.into());
         let z = target.z.map_or(self.position.z, |z| {
@@ -487,7 +490,7 @@ impl Machine {
                 z: PEN_UP,
                 ..self.position
             };
-            self.start(Manner::Straight, Target::at(up));
+            self.start(Manner::Straight, &Target::at(up));
         }
     }
 
@@ -548,7 +551,7 @@ mod tests {
     fn a_move_from_rest_is_answered_at_once() {
         let mut machine = arm();
         assert_eq!(
-            machine.take(A, line(1000, 1000, 0)),
+            machine.take(A, &line(1000, 1000, 0)),
             Some(moving(1000, 1000, 0))
         );
     }
@@ -557,8 +560,8 @@ mod tests {
     fn a_move_in_motion_is_answered_when_the_prior_one_has_completed() {
         let mut machine = arm();
         // 100 units with the pen up: 7 steps, 70 ms.
-        machine.take(A, line(1100, 1000, 1000));
-        assert_eq!(machine.take(A, line(1100, 900, 1000)), None);
+        machine.take(A, &line(1100, 1000, 1000));
+        assert_eq!(machine.take(A, &line(1100, 900, 1000)), None);
         run(&mut machine, 0, 60);
         assert_eq!(machine.next_report(), None);
         run(&mut machine, 70, 70);
@@ -574,9 +577,9 @@ mod tests {
     fn moves_follow_one_another_without_a_gap_whatever_the_frame() {
         for frame in [1_000, 3_003, 10_000, 20_000, 200_000] {
             let mut machine = arm();
-            machine.take(A, line(1015, 1000, 1000));
-            machine.take(A, line(1015, 985, 1000));
-            machine.take(B, line(1000, 985, 1000));
+            machine.take(A, &line(1015, 1000, 1000));
+            machine.take(A, &line(1015, 985, 1000));
+            machine.take(B, &line(1000, 985, 1000));
             let mut now = 0;
             while machine.is_busy() {
                 now += frame;
@@ -597,7 +600,7 @@ mod tests {
         let mut machine = arm();
         for _ in 0..3 {
             assert_eq!(
-                machine.take(A, line(1000, 1000, 1000)),
+                machine.take(A, &line(1000, 1000, 1000)),
                 Some(moving(1000, 1000, 1000))
             );
         }
@@ -606,8 +609,8 @@ mod tests {
     #[test]
     fn corners_are_reached_exactly() {
         let mut machine = arm();
-        machine.take(A, line(1100, 1000, 1000));
-        machine.take(A, line(1100, 900, 1000));
+        machine.take(A, &line(1100, 1000, 1000));
+        machine.take(A, &line(1100, 900, 1000));
         assert_eq!(
             run(&mut machine, 0, 70).position,
             Position::from_units(1100, 1000, 1000)
@@ -617,9 +620,9 @@ mod tests {
     #[test]
     fn clients_take_turns_in_the_order_they_came() {
         let mut machine = arm();
-        machine.take(A, line(1015, 1000, 1000));
-        machine.take(B, line(1030, 1000, 1000));
-        machine.take(A, line(1045, 1000, 1000));
+        machine.take(A, &line(1015, 1000, 1000));
+        machine.take(B, &line(1030, 1000, 1000));
+        machine.take(A, &line(1045, 1000, 1000));
         run(&mut machine, 0, 10);
         assert_eq!(machine.next_report(), Some((B, moving(1030, 1000, 1000))));
         run(&mut machine, 20, 20);
@@ -629,12 +632,12 @@ mod tests {
     #[test]
     fn an_omitted_coordinate_is_the_arms_when_the_move_begins() {
         let mut machine = arm();
-        machine.take(A, line(1100, 1000, 1000));
+        machine.take(A, &line(1100, 1000, 1000));
         let lower = Target {
             z: Some(WideCoordinate::from_bits(0)),
             ..Target::default()
         };
-        machine.take(B, Errand::Move(Manner::Straight, lower));
+        machine.take(B, &Errand::Move(Manner::Straight, lower));
         run(&mut machine, 0, 70);
         assert_eq!(machine.next_report(), Some((B, moving(1100, 1000, 0))));
     }
@@ -642,7 +645,7 @@ mod tests {
     #[test]
     fn out_of_reach_goes_to_the_closest_point_with_the_pen_up() {
         let mut machine = arm();
-        let Some(Report::Moving { end, limited }) = machine.take(A, line(2500, 0, 0)) else {
+        let Some(Report::Moving { end, limited }) = machine.take(A, &line(2500, 0, 0)) else {
             unreachable!("the arm rests");
         };
         assert_eq!((end.x.rounded(), end.y.rounded(), end.z), (1950, 0, PEN_UP));
@@ -654,8 +657,8 @@ mod tests {
     #[test]
     fn a_short_end_is_marked_also_when_the_next_move_follows_at_once() {
         let mut machine = arm();
-        machine.take(A, line(2500, 1000, 1000));
-        machine.take(A, line(1000, 1000, 1000));
+        machine.take(A, &line(2500, 1000, 1000));
+        machine.take(A, &line(1000, 1000, 1000));
         let marked = (0..400)
             .filter(|at| machine.tick(Micros::new(at * 10_000)).held)
             .count();
@@ -666,12 +669,12 @@ mod tests {
     fn z_is_limited_without_a_word() {
         let mut machine = arm();
         assert_eq!(
-            machine.take(A, line(1000, 1000, -20)),
+            machine.take(A, &line(1000, 1000, -20)),
             Some(moving(1000, 1000, 0))
         );
         run(&mut machine, 0, 1000);
         assert_eq!(
-            machine.take(A, line(1000, 1000, 2000)),
+            machine.take(A, &line(1000, 1000, 2000)),
             Some(moving(1000, 1000, 1000))
         );
     }
@@ -679,10 +682,10 @@ mod tests {
     #[test]
     fn a_way_over_the_body_is_held_at_the_edge() {
         let mut machine = arm();
-        machine.take(A, line(510, 300, 1000));
+        machine.take(A, &line(510, 300, 1000));
         run(&mut machine, 0, 1000);
         let over = line(720, -300, 1000);
-        let Some(Report::Moving { limited, .. }) = machine.take(A, over) else {
+        let Some(Report::Moving { limited, .. }) = machine.take(A, &over) else {
             unreachable!("the arm rests");
         };
         assert_eq!(limited, Some(Limited::Way));
@@ -699,13 +702,13 @@ mod tests {
     #[test]
     fn a_rapid_way_over_the_body_is_held_and_told() {
         let mut machine = arm();
-        machine.take(A, line(510, 300, 1000));
+        machine.take(A, &line(510, 300, 1000));
         run(&mut machine, 0, 1000);
         let over = Errand::Move(
             Manner::Rapid,
             Target::at(Position::from_units(700, -900, 1000)),
         );
-        let report = machine.take(A, over);
+        let report = machine.take(A, &over);
         let mut held = false;
         for at in 1001..=1400 {
             let set_point = machine.tick(Micros::new(at * 1_000));
@@ -724,7 +727,7 @@ mod tests {
     #[test]
     fn an_abandoned_pen_is_lifted_after_five_seconds() {
         let mut machine = arm();
-        machine.take(A, line(1000, 1000, 0));
+        machine.take(A, &line(1000, 1000, 0));
         run(&mut machine, 0, 1000);
         machine.client_gone(A);
         assert!(run(&mut machine, 1010, 5990).position.pen_is_down());
@@ -734,17 +737,17 @@ mod tests {
     #[test]
     fn another_clients_drawing_keeps_the_pen_down() {
         let mut machine = arm();
-        machine.take(A, line(1000, 1000, 0));
+        machine.take(A, &line(1000, 1000, 0));
         run(&mut machine, 0, 1000);
         machine.client_gone(A);
-        machine.take(B, line(1100, 1000, 0));
+        machine.take(B, &line(1100, 1000, 0));
         assert!(run(&mut machine, 1010, 9000).position.pen_is_down());
     }
 
     #[test]
     fn a_listener_that_leaves_does_not_lift_the_drawers_pen() {
         let mut machine = arm();
-        machine.take(A, line(1000, 1000, 0));
+        machine.take(A, &line(1000, 1000, 0));
         machine.client_gone(B);
         assert!(run(&mut machine, 0, 9000).position.pen_is_down());
     }
@@ -752,9 +755,9 @@ mod tests {
     #[test]
     fn a_rest_is_kept_until_it_is_released() {
         let mut machine = arm();
-        machine.take(A, line(1015, 1000, 1000));
-        assert_eq!(machine.take(A, Errand::Rest), None);
-        assert_eq!(machine.take(B, line(1030, 1000, 1000)), None);
+        machine.take(A, &line(1015, 1000, 1000));
+        assert_eq!(machine.take(A, &Errand::Rest), None);
+        assert_eq!(machine.take(B, &line(1030, 1000, 1000)), None);
         run(&mut machine, 0, 10);
         assert_eq!(machine.next_report(), Some((A, Report::Resting)));
         assert_eq!(
@@ -778,7 +781,7 @@ mod tests {
     #[test]
     fn calibrating_keeps_the_servos_and_makes_their_place_home() {
         let mut machine = arm();
-        machine.take(A, line(1020, 990, 950));
+        machine.take(A, &line(1020, 990, 950));
         let before = run(&mut machine, 0, 1000);
         let calibration = machine.calibration_here();
         machine.set_calibration(calibration);
@@ -803,7 +806,7 @@ mod tests {
     #[test]
     fn pictures_see_what_the_pulses_say() {
         let mut machine = arm();
-        machine.take(A, line(1400, -300, 0));
+        machine.take(A, &line(1400, -300, 0));
         let last = run(&mut machine, 0, 2000);
         let seen = position_of(last.pulses, machine.data());
         assert!((seen.x.to_f64() - 1400.0).abs() < 0.05 && (seen.y.to_f64() + 300.0).abs() < 0.05);

@@ -34,7 +34,7 @@ impl Arm {
     }
 
     /// Has an errand done and gives its report: at once from rest, else when its turn has come.
-    pub async fn errand(&self, client: Client, errand: Errand) -> Report {
+    pub async fn errand(&self, client: Client, errand: &Errand) -> Report {
         // Slots are below MAX_CLIENTS by the type's own rule.
         let Some(signal) = self.reports.get(client.slot()) else {
             return Report::Resting;
@@ -48,7 +48,7 @@ impl Arm {
 
     /// Waits until the arm rests, and keeps it at rest until the guard is dropped.
     pub async fn rest(&self, client: Client) -> Rest<'_> {
-        self.errand(client, Errand::Rest).await;
+        self.errand(client, &Errand::Rest).await;
         Rest { arm: self, client }
     }
 

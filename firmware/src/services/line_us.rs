@@ -114,10 +114,10 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     while let Ok(length @ 1..) = answers.link.socket.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
-            match request {
+            match &request {
                 // The busiest one, without a detour.
                 Request::Errand(errand) => reply.report(&house.arm.errand(client, errand).await),
-                other => perform(other, &mut reply, client, house).await,
+                _ => perform(request, &mut reply, client, house).await,
             }
             answers.send(&reply).await;
         }
@@ -130,7 +130,7 @@ async fn perform(request: Request, reply: &mut Reply, client: Client, house: &Ho
     let arm = &house.arm;
     match request {
         Request::Answered => {}
-        Request::Errand(errand) => reply.report(&arm.errand(client, errand).await),
+        Request::Errand(errand) => reply.report(&arm.errand(client, &errand).await),
         Request::SetSpeed { pen_down, pen_up } => {
             arm.with(|machine| {
                 let now = machine.steps();

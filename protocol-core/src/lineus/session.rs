@@ -70,24 +70,29 @@ impl Session {
     /// in `reply`.
     pub fn next_request(&mut self, input: &mut &[u8], reply: &mut Reply) -> Option<Request> {
         let line = self.lines.next_line(input)?;
-        let command = match line.map_err(Refusal::from).and_then(parse) {
-            Ok(command) => command,
+        let command = line.map_err(Refusal::from).and_then(parse);
+        // The busiest one first, and without moving it about: commands are large.
+        if let Ok(Command::Move(manner, axes)) = &command {
+            let [x, y, z] = axes.to_array();
+            let target = Target {
+                x: x.map(|x| self.transform.x(x)),
+                y: y.map(|y| self.transform.y(y)),
+                z: z.map(WideCoordinate::from_bits),
+            };
+            return Some(Request::Errand(Errand::Move(*manner, target)));
+        }
+        match command {
+            Ok(command) => Some(self.request(command, reply)),
             Err(refusal) => {
                 reply.refuse(&refusal);
-                return Some(Request::Answered);
+                Some(Request::Answered)
             }
-        };
-        Some(match command {
-            Command::Move(manner, axes) => {
-                let [x, y, z] = axes.to_array();
-                let target = Target {
-                    x: x.map(|x| self.transform.x(x)),
-                    y: y.map(|y| self.transform.y(y)),
-                    z: z.map(WideCoordinate::from_bits),
-                };
-                Request::Errand(Errand::Move(manner, target))
-            }
-            Command::Home => Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
+        }
+    }
+
+    #[inline(never)]
+    fn request(&mut self, command: Command, reply: &mut Reply) -> Request {
+        match command {
             Command::Transform { x, y, scale } => {
                 match self.transform.with(x, y, scale) {
                     Some(transform) => {
@@ -98,10 +103,12 @@ impl Session {
                 }
                 Request::Answered
             }
-            Command::Nothing => {
+            // A move was dealt with before.
+            Command::Nothing | Command::Move(..) => {
                 reply.ok();
                 Request::Answered
             }
+            Command::Home => Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
             Command::Speed { pen_down, pen_up } => Request::SetSpeed { pen_down, pen_up },
             Command::Position => Request::Position,
             Command::Angles => Request::Angles,
@@ -112,7 +119,7 @@ impl Session {
             Command::Name => Request::Name,
             Command::Rename(name) => Request::Rename(name),
             Command::Join(network) => Request::Join(network),
-        })
+        }
     }
 }
 

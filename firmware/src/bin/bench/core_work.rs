@@ -33,7 +33,7 @@ pub fn report() {
         let mut machine = Machine::new(ArmData::default(), Default::default());
         machine.tick(Micros::default());
         let client = Client::new(0).expect("there is a first client");
-        machine.take(client, Errand::Move(Manner::Straight, Target::at(to)));
+        machine.take(client, &Errand::Move(Manner::Straight, Target::at(to)));
         RefCell::new(machine)
     });
     measure::report("set-point", &moves, set_point);
