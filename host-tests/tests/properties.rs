@@ -32,7 +32,7 @@ fn check_form(line: &str, answer: &Answer) -> Result<(), TestCaseError> {
         "{line:?}: {text:?} starts wrongly"
     );
     prop_assert!(
-        text.matches('"').count() % 2 == 0,
+        text.matches('"').count().is_multiple_of(2),
         "{line:?}: {text:?} leaves a quote open"
     );
     let diagnostics = text.starts_with("ok name:");
