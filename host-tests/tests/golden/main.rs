@@ -1,13 +1,11 @@
 //! Set-points of the core, step by step, against the independent model: every example, and the edges
 //! of everything.
 
-mod golden {
-    pub mod cases;
-    pub mod compare;
-}
+mod cases;
+mod compare;
 
-use golden::cases::{DECIMAL_STEPS, EDGE_CASES};
-use golden::compare::{against_model, calibrated_against_model};
+use cases::{DECIMAL_STEPS, EDGE_CASES};
+use compare::{against_model, calibrated_against_model};
 use std::path::{Path, PathBuf};
 
 /// A frame that no step is a multiple of.
@@ -110,7 +108,7 @@ fn a_calibration_is_added_to_the_angles() {
 #[test]
 fn the_comparison_notices_what_is_wrong() {
     // The core is asked for another drawing than the model: each difference is found and named.
-    let compare = golden::compare::programs;
+    let compare = compare::programs;
     let base = "G01 X1100 Z0\nG01 X1200";
     for (other, what) in [
         ("G01 X1100 Z0\nG01 X1205", "steps"),

@@ -1,12 +1,10 @@
 //! What holds for any sequence of lines, right or wrong, through sessions and machine.
 
-mod properties {
-    pub mod lines;
-}
+mod lines;
 
 use host_tests::bench::{Answer, Bench};
 use host_tests::model;
-use properties::lines::{Said, any_lines, sprinkled};
+use lines::{Said, any_lines, sprinkled};
 use proptest::prelude::*;
 use protocol_core::machine::{MAX_CLIENTS, SetPoint};
 
