@@ -1,6 +1,6 @@
 //! A client that speaks Line-us byte by byte.
 
-use socket2::{Domain, SockRef, Socket, Type};
+use socket2::SockRef;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::thread;
@@ -25,24 +25,6 @@ impl Client {
     /// When there is nobody.
     pub fn connect(address: SocketAddr) -> Self {
         let stream = TcpStream::connect(address).expect("the arm takes connections");
-        Self::over(stream)
-    }
-
-    /// Connects with little room for what is not read.
-    ///
-    /// # Panics
-    /// When there is nobody.
-    pub fn connect_with_small_buffers(address: SocketAddr) -> Self {
-        let socket = Socket::new(Domain::IPV4, Type::STREAM, None).expect("a socket can be made");
-        // Before connecting, or the window is agreed on already.
-        socket
-            .set_recv_buffer_size(4096)
-            .and_then(|()| socket.connect(&address.into()))
-            .expect("the arm takes connections");
-        Self::over(socket.into())
-    }
-
-    fn over(stream: TcpStream) -> Self {
         stream
             .set_nodelay(true)
             .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
@@ -109,16 +91,41 @@ impl Client {
     }
 
     /// Whether nothing arrives for a while.
+    ///
+    /// # Panics
+    /// When the connection has no options.
     pub fn hears_nothing_for(&mut self, time: Duration) -> bool {
+        if !self.received.is_empty() {
+            return false;
+        }
+        self.set_patience(time);
+        let heard = self.stream.peek(&mut [0]);
+        self.set_patience(PATIENCE);
+        heard
+            .is_err_and(|error| matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+    }
+
+    /// Whether the next message has arrived to its end, or does so in time.
+    ///
+    /// # Panics
+    /// When the connection has no options.
+    pub fn has_whole_reply_within(&mut self, time: Duration) -> bool {
+        let deadline = Instant::now() + time;
+        let mut chunk = [0; 4096];
+        self.set_patience(time);
+        while !self.received.contains(&0) && Instant::now() < deadline {
+            match self.stream.read(&mut chunk) {
+                Ok(length @ 1..) => self.received.extend_from_slice(&chunk[..length]),
+                _ => break,
+            }
+        }
+        self.set_patience(PATIENCE);
+        self.received.contains(&0)
+    }
+
+    fn set_patience(&self, time: Duration) {
         let options = self.stream.set_read_timeout(Some(time));
         options.expect("a connection has options");
-        let heard = self.stream.peek(&mut [0]);
-        let options = self.stream.set_read_timeout(Some(PATIENCE));
-        options.expect("a connection has options");
-        self.received.is_empty()
-            && heard.is_err_and(|error| {
-                matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
-            })
     }
 
     /// Waits until the arm stands at a place, as M114 says it.

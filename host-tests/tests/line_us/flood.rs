@@ -86,7 +86,7 @@ fn flood(client: &Client, line: &str, taken: &AtomicU64, stop: &AtomicBool) {
 fn a_client_that_floods_and_never_reads_holds_nobody_up() {
     let (_folder, arm) = arm("1");
     let before = arm.memory_kb();
-    let flooder = Client::connect_with_small_buffers(arm.address());
+    let flooder = arm.connect();
     let mut other = arm.client();
     let (taken, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let mut slowest = Duration::ZERO;
@@ -168,10 +168,59 @@ fn a_client_that_floods_and_reads_holds_nobody_up() {
 #[test]
 fn a_flooded_drawing_is_drawn_to_its_end_although_nobody_reads() {
     let (_folder, arm) = arm("max");
-    let mut flooder = Client::connect_with_small_buffers(arm.address());
+    let mut flooder = arm.connect();
     flooder.send("G01 X1100 Y900\nG01 X1000 Y900\n".repeat(1000));
     // 8 MB of replies, more than systems keep for a socket.
     flooder.send("M122\n".repeat(32_000));
     flooder.send("G01 X1234 Y567 Z1000\n");
     arm.client().wait_for_place("ok X:1234 Y:567 Z:1000");
+}
+
+/// A client that has sent more than its replies fit anywhere, read nothing, been given up on, and now wakes up.
+fn sleeper(arm: &Desktop) -> Client {
+    let mut sleeper = arm.connect();
+    sleeper.send("M122\n".repeat(32_000));
+    sleeper.send("G01 X1234 Y567 Z1000\n");
+    arm.client().wait_for_place("ok X:1234 Y:567 Z:1000");
+    sleeper
+}
+
+#[test]
+fn replies_that_a_client_was_too_slow_for_are_lost_whole() {
+    let (_folder, arm) = arm("max");
+    let mut sleeper = sleeper(&arm);
+    sleeper.send("M550\n");
+    assert!(sleeper.reply().starts_with("hello "));
+    let mut count = 0;
+    loop {
+        let reply = sleeper.reply();
+        if reply == "ok MACHINENAME:line-us" {
+            break;
+        }
+        assert!(
+            reply.starts_with("ok name:") && reply.ends_with('"') || reply.starts_with("ok X:"),
+            "reply {count} is torn: {reply:?}"
+        );
+        count += 1;
+    }
+    println!("{count} of 32001 replies reached a client that did not read");
+    assert!(count < 32_001, "nothing was lost: this test tests nothing");
+    // It reads again, so it is told everything again.
+    for _ in 0..100 {
+        assert_eq!(sleeper.say("M550"), "ok MACHINENAME:line-us");
+    }
+}
+
+#[test]
+fn a_reply_of_which_a_part_went_out_is_completed_when_the_client_reads_again() {
+    let (_folder, arm) = arm("max");
+    let mut sleeper = sleeper(&arm);
+    assert!(sleeper.reply().starts_with("hello "));
+    while !sleeper.hears_nothing_for(Duration::from_secs(1)) {
+        assert!(
+            sleeper.has_whole_reply_within(PROMPT),
+            "the end of a reply does not come"
+        );
+        sleeper.reply();
+    }
 }
