@@ -1,1 +1,7 @@
+//! Tests of Quill from outside, and what they need: an independent model of the arm ([`model`]), the
+//! core's session and machine without a firmware around them ([`bench`]), and the desktop arm as a
+//! process with clients over TCP ([`desktop`]).
 
+pub mod bench;
+pub mod desktop;
+pub mod model;

@@ -341,7 +341,8 @@ impl Machine {
             position,
             pulses: self.pulses(position),
             held: held || self.passed_short,
-            moving: was_moving || self.active.is_some(),
+            // A move that ended between two frames shows by the place alone.
+            moving: was_moving || self.active.is_some() || position != self.last.position,
         };
         self.passed_short = false;
         self.last
@@ -352,9 +353,9 @@ impl Machine {
         self.active.as_ref().map(|active| active.ends)
     }
 
-    /// Whether a move is under way or waits.
+    /// Whether a move is under way or waits, or the servos have not been told its end.
     pub fn is_busy(&self) -> bool {
-        self.active.is_some() || !self.waiting.is_empty()
+        self.active.is_some() || !self.waiting.is_empty() || self.last.position != self.position
     }
 
     /// Where the nib is now: the position of the last set-point.
@@ -410,9 +411,14 @@ impl Machine {
         self.last.pulses = self.pulses(self.position);
     }
 
-    /// What the servos were told last, calibration included.
+    /// What the servos were told last, or at rest will have been told at the next frame, calibration
+    /// included.
     fn told(&self) -> Angles {
-        self.calibration.apply(self.angles())
+        let position = match self.active {
+            Some(_) => self.last.position,
+            None => self.position,
+        };
+        self.calibration.apply(inverse(position, self.data.lift))
     }
 
     #[inline]

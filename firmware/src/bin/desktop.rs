@@ -4,13 +4,16 @@ use clap::{Args, Parser, Subcommand};
 use core::net::SocketAddr;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::flash::{self, FileFlash};
 use firmware::boards::desktop::net::Listener;
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
-use firmware::boards::desktop::{IDENTITY, VITALS};
+use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS};
+use firmware::boards::scripted_radio::ScriptedRadio;
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{Server, serve};
@@ -97,6 +100,8 @@ impl Common {
 fn main() -> ExitCode {
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Info)
+        // Of WiFi there is only news when somebody asks for a network that is not there.
+        .filter_module("firmware::services::network", log::LevelFilter::Warn)
         .format(|out, record| writeln!(out, "{}", record.args()))
         .target(env_logger::Target::Stdout)
         .init();
@@ -161,6 +166,7 @@ fn serve_clients(
     static SERVER: Server = Server::new();
     spawner.spawn(arm(house, servos, frame)?);
     spawner.spawn(storage(house, memory)?);
+    spawner.spawn(wifi(house)?);
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(listener, client, house)?);
     }
@@ -184,6 +190,14 @@ async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
         .arm
         .tick(servos, TimedFrames::every(frame), frame)
         .await;
+}
+
+/// There is no radio here: the network policy runs on one that hears nothing.
+#[embassy_executor::task]
+async fn wifi(house: &'static House) {
+    static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+    let radio = ScriptedRadio::new(&[], &CUT);
+    house.wifi.run(radio, NoAddress, &house.panel).await;
 }
 
 #[embassy_executor::task]

@@ -9,6 +9,7 @@ use core::fmt::Display;
 use core::sync::atomic::{AtomicU8, Ordering};
 use edge_nal::{Close, TcpAccept, TcpShutdown};
 use embassy_futures::select::{Either, select};
+use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
@@ -26,6 +27,8 @@ const CHUNK: usize = 512;
 /// How long a reply may wait for a client that does not read. After that the reply is lost, and so are
 /// later ones, without a wait, until the client reads again: its commands are executed all the same.
 pub const PATIENCE: Duration = Duration::from_secs(2);
+/// How often a client that did not take the whole of a reply is tried again.
+const RETRY: Duration = Duration::from_millis(100);
 /// How long a client that is being turned away has to read why.
 const FAREWELL: Duration = Duration::from_secs(1);
 
@@ -111,7 +114,7 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
-    while let Ok(length @ 1..) = answers.link.socket.read(&mut chunk).await {
+    while let Ok(length @ 1..) = answers.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
             match &request {
@@ -120,6 +123,10 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
                 _ => perform(request, &mut reply, client, house).await,
             }
             answers.send(&reply).await;
+        }
+        // A client that sends faster than it is served would else keep everybody waiting.
+        if length == CHUNK {
+            yield_now().await;
         }
     }
     house.arm.with(|machine| machine.client_gone(client));
@@ -223,7 +230,7 @@ struct Answers<S> {
     rest: heapless::Vec<u8, MAX_REPLY>,
 }
 
-impl<S: Write> Answers<S> {
+impl<S: Read + Write> Answers<S> {
     const fn new(socket: S) -> Self {
         Self {
             link: Link {
@@ -235,10 +242,25 @@ impl<S: Write> Answers<S> {
         }
     }
 
+    /// Reads what the client has sent, and meanwhile sees to what it has not yet taken.
+    async fn read(&mut self, chunk: &mut [u8]) -> Result<usize, S::Error> {
+        while !self.rest.is_empty() && !self.link.gone {
+            if let Ok(read) = with_timeout(RETRY, self.link.socket.read(chunk)).await {
+                return read;
+            }
+            self.send_rest().await;
+        }
+        self.link.socket.read(chunk).await
+    }
+
+    async fn send_rest(&mut self) {
+        let sent = self.link.push(&self.rest).await;
+        self.rest.drain(..sent);
+    }
+
     async fn send(&mut self, reply: &Reply) {
         if !self.rest.is_empty() {
-            let sent = self.link.push(&self.rest).await;
-            self.rest.drain(..sent);
+            self.send_rest().await;
             if !self.rest.is_empty() {
                 return;
             }

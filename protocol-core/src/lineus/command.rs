@@ -82,12 +82,16 @@ pub fn parse(line: &[u8]) -> Result<Command, Refusal<'_>> {
         None => return Ok(Command::Nothing),
         Some((b'G', 1)) => Manner::Straight,
         Some((b'G', 0)) => Manner::Rapid,
-        Some(code) => return other_than_a_move(code, words),
+        Some(code) => return other_than_a_move(code, words, line),
     };
     a_move(words, manner)
 }
 
-fn other_than_a_move<'a>(code: (u8, u32), mut words: Words<'a>) -> Result<Command, Refusal<'a>> {
+fn other_than_a_move<'a>(
+    code: (u8, u32),
+    mut words: Words<'a>,
+    line: &'a [u8],
+) -> Result<Command, Refusal<'a>> {
     match code {
         (b'G', 28) => without_parameters(&mut words, Command::Home),
         (b'G', 54) => transform(&mut words),
@@ -99,7 +103,7 @@ fn other_than_a_move<'a>(code: (u8, u32), mut words: Words<'a>) -> Result<Comman
         (b'M', 550) => name(&mut words),
         (b'M', 587) => network(&mut words),
         (b'M', code @ (588 | 997)) => Err(Refusal::NotYet(code)),
-        (letter, number) => Err(Refusal::UnknownCommand(letter.into(), number)),
+        _ => Err(Words::new(line).unknown().into()),
     }
 }
 

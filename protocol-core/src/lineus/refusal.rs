@@ -11,8 +11,6 @@ pub enum Refusal<'a> {
     TooLong,
     /// The line is no words.
     Words(WordError<'a>),
-    /// No command with this letter and number.
-    UnknownCommand(char, u32),
     /// A command that this firmware will know, but does not yet.
     NotYet(u32),
     /// A letter that the command does not have.
@@ -55,9 +53,6 @@ impl fmt::Display for Refusal<'_> {
         match *self {
             Self::TooLong => write!(out, "line longer than {MAX_LINE} bytes"),
             Self::Words(error) => words(error, out),
-            Self::UnknownCommand(letter, number) => {
-                write!(out, "unknown command '{letter}{number}'")
-            }
             Self::NotYet(997) => {
                 out.write_str("M997 is missing: this firmware cannot update itself yet")
             }

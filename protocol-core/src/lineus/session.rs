@@ -200,7 +200,8 @@ mod tests {
     fn refusals_name_the_letter_and_the_reason() {
         for (line, reason) in [
             ("undefined", "unknown command 'undefined'"),
-            ("G02 X5", "unknown command 'G2'"),
+            ("G02 X5", "unknown command 'G02'"),
+            ("(a) g2 X5", "unknown command 'g2'"),
             ("G01.5 X5", "unknown command 'G01.5'"),
             ("M9999", "unknown command 'M9999'"),
             ("G01 Q5", "unknown parameter Q"),

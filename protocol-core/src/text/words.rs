@@ -107,6 +107,19 @@ impl<'a> Words<'a> {
         Err(token(start).map_or(WordError::NotUtf8, WordError::NoCode))
     }
 
+    /// The code of the line, of which nobody knows what it means.
+    #[cold]
+    pub fn unknown(self) -> WordError<'a> {
+        let mut start = skip_blanks(self.rest);
+        while let [b'\t' | b';' | b'(', ..] = start {
+            match after_comments(start) {
+                Ok(after) => start = after,
+                Err(error) => return error,
+            }
+        }
+        token(start).map_or(WordError::NotUtf8, WordError::NoCode)
+    }
+
     /// The next parameter's letter in upper case, `None` at the end of the line.
     #[inline(always)]
     pub fn letter(&mut self) -> Result<Option<char>, WordError<'a>> {

@@ -53,7 +53,7 @@ impl FileFlash {
     /// Opens the flash in a file, which is made if it does not exist.
     ///
     /// # Errors
-    /// When the file cannot be read and written, or is something else than a flash.
+    /// When the file cannot be read and written.
     pub fn open(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new()
             .read(true)
@@ -61,14 +61,8 @@ impl FileFlash {
             .create(true)
             .truncate(false)
             .open(path)?;
-        let length = file.metadata()?.len();
-        if length != 0 && length != u64::from(SIZE) {
-            return Err(io::Error::other(
-                "is no state of an arm, and stays as it is",
-            ));
-        }
         let mut contents = Vec::new();
-        (&file).read_to_end(&mut contents)?;
+        (&file).take(SIZE.into()).read_to_end(&mut contents)?;
         contents.resize(SIZE as usize, 0xff);
         Ok(Self {
             contents,

@@ -8,7 +8,7 @@ pub mod flash;
 pub mod net;
 pub mod recorder;
 
-use crate::board::Vitals;
+use crate::board::{Address, Vitals};
 use protocol_core::lineus::Identity;
 
 /// A made-up address of the kind that no maker has.
@@ -22,6 +22,17 @@ pub const VITALS: Vitals = Vitals {
     reset_reason: "program start",
     last_panic: "",
 };
+
+/// Addresses are the operating system's business.
+pub struct NoAddress;
+
+impl Address for NoAddress {
+    fn ask(&self) {}
+
+    async fn serve_guests(&self) -> ! {
+        core::future::pending().await
+    }
+}
 
 /// Available memory in bytes where the system tells it, as far as 32 bits go; else 0.
 fn free_memory() -> u32 {
