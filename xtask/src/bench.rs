@@ -1,7 +1,7 @@
 //! What the work of the firmware costs on the chip's instruction set, beside what else one could take.
 
 use crate::board::Board;
-use crate::emulator::{Emulator, Options, free_address, machine};
+use crate::emulator::{Emulator, Options, Time, free_address, machine};
 use anyhow::{Context, Result, bail, ensure};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -102,7 +102,7 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
 
 /// Runs a program that prints `name,instructions` lines on the serial port.
 fn run_bench(program: &Path) -> Result<Vec<(String, u64)>> {
-    let output = machine(program, true)
+    let output = machine(program, Time::Instructions)
         .args(["-serial", "stdio"])
         .stdin(Stdio::null())
         .stderr(Stdio::inherit())
@@ -132,7 +132,7 @@ fn round_trip(program: &Path) -> Result<u64> {
     let options = Options {
         line_us: free_address()?,
         flash: folder.path().join("flash.img"),
-        count_instructions: true,
+        time: Time::Instructions,
     };
     let mut emulator = Emulator::boot(program, &options)?;
     emulator.wait_ready()?;

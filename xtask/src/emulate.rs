@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 use xtask::board::Board;
-use xtask::emulator::{Emulator, Options};
+use xtask::emulator::{Emulator, Options, Time};
 use xtask::records::Record;
 
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -20,7 +20,7 @@ pub fn emulate(options: Emulate, setup: bool) -> Result<()> {
     let machine = Options {
         line_us: options.line_us,
         flash: options.flash,
-        count_instructions: false,
+        time: Time::Wall,
     };
     let outputs = Outputs {
         trace: options.trace,

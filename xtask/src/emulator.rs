@@ -25,8 +25,20 @@ pub struct Options {
     pub line_us: SocketAddr,
     /// The flash's file; made, erased, if it does not exist.
     pub flash: PathBuf,
-    /// Count instructions as time: one a nanosecond. Slower, exact and repeatable.
-    pub count_instructions: bool,
+    /// What the machine takes for time.
+    pub time: Time,
+}
+
+/// What an emulated machine takes for time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Time {
+    /// The wall's.
+    Wall,
+    /// Its own instructions, one a nanosecond, and the wall's while it sleeps.
+    Instructions,
+    /// Its own instructions alone: where it would sleep, time jumps to what it waits for. Exact and
+    /// repeatable, and much faster than the wall's while there is little to do.
+    Virtual,
 }
 
 /// A running machine; dropped, its power is cut.
@@ -162,7 +174,7 @@ pub fn free_address() -> Result<SocketAddr> {
 }
 
 fn command(firmware: &Path, options: &Options, records: &Path, console: &Path) -> Command {
-    let mut qemu = machine(firmware, options.count_instructions);
+    let mut qemu = machine(firmware, options.time);
     qemu.args(["-serial", "none"])
         .arg("-chardev")
         // A file keeps everything; a socket would lose what is not read at once.
@@ -192,15 +204,21 @@ fn command(firmware: &Path, options: &Options, records: &Path, console: &Path) -
 }
 
 /// The bare machine, for a program that needs nothing around it.
-pub fn machine(program: &Path, count_instructions: bool) -> Command {
+pub fn machine(program: &Path, time: Time) -> Command {
     let mut qemu = Command::new(QEMU.0);
     qemu.args(["-M", "virt", "-cpu", "rv32", "-m", "16", "-bios", "none"])
         .args(["-display", "none", "-monitor", "none"])
         .args(["-global", "virtio-mmio.force-legacy=false"])
         .arg("-kernel")
         .arg(program);
-    if count_instructions {
-        qemu.args(["-icount", "shift=0"]);
+    match time {
+        Time::Wall => {}
+        Time::Instructions => {
+            qemu.args(["-icount", "shift=0"]);
+        }
+        Time::Virtual => {
+            qemu.args(["-icount", "shift=0,sleep=off"]);
+        }
     }
     qemu
 }

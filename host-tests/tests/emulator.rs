@@ -1,0 +1,361 @@
+//! The firmware on the chip's instruction set, in QEMU, with everything around it real: sockets, a disk
+//! that survives, and servos of which every pulse is read back.
+
+use host_tests::desktop::{Client, draw};
+use std::collections::BTreeSet;
+use std::fs;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
+use tempfile::TempDir;
+use xtask::emulator::{Emulator, Options, Time, free_address};
+use xtask::records::{Frame, Record};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
+
+/// A machine with its disk.
+struct Machine {
+    emulator: Emulator,
+    address: SocketAddr,
+    folder: TempDir,
+    time: Time,
+}
+
+impl Machine {
+    fn boot(time: Time) -> Self {
+        Self::boot_in(tempfile::tempdir().unwrap(), time)
+    }
+
+    fn boot_in(folder: TempDir, time: Time) -> Self {
+        let firmware = std::env::var_os("QUILL_VIRT_FIRMWARE")
+            .map(PathBuf::from)
+            .expect(
+                "QUILL_VIRT_FIRMWARE names the firmware: run these tests with `cargo xtask test`",
+            );
+        let options = Options {
+            line_us: free_address().unwrap(),
+            flash: folder.path().join("flash"),
+            time,
+        };
+        let mut emulator = Emulator::boot(&firmware, &options).unwrap();
+        emulator.wait_ready().unwrap();
+        Self {
+            emulator,
+            address: options.line_us,
+            folder,
+            time,
+        }
+    }
+
+    /// Pulls the plug, and puts it back with the same disk.
+    fn power_cycle(self) -> Self {
+        let Self {
+            emulator,
+            folder,
+            time,
+            ..
+        } = self;
+        drop(emulator);
+        Self::boot_in(folder, time)
+    }
+
+    /// A client that has heard the greeting.
+    fn client(&self) -> Client {
+        let mut client = Client::connect(self.address);
+        let greeting = client.reply();
+        assert!(greeting.starts_with("hello VERSION:"), "{greeting:?}");
+        client
+    }
+
+    /// All frames so far; none is missing.
+    fn frames(&mut self) -> Vec<Frame> {
+        let records = self.emulator.records().unwrap();
+        let frames: Vec<Frame> = records
+            .into_iter()
+            .filter_map(|record| match record {
+                Record::Frame(frame) => Some(frame),
+                Record::Light { .. } => None,
+                Record::Lost(count) => panic!("{count} records are lost"),
+            })
+            .collect();
+        for pair in frames.windows(2) {
+            let gap = pair[1].time.get() - pair[0].time.get();
+            assert_eq!(gap, 10_000, "a frame is missing after {:?}", pair[0]);
+        }
+        frames
+    }
+}
+
+type Pulses = [u32; 3];
+
+/// Pulses one after the other, those that are the same as before left out: what the servos did, without
+/// how long they rested.
+fn motion(pulses: impl IntoIterator<Item = Pulses>) -> Vec<Pulses> {
+    let mut motion: Vec<Pulses> = pulses.into_iter().collect();
+    motion.dedup();
+    motion
+}
+
+/// What the desktop arm's servos do with a file, in tenths of a nanosecond.
+fn desktop_motion(file: &Path) -> Vec<Pulses> {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = folder.path().join("trace.csv");
+    let run = draw(file, &["--trace", &trace.to_string_lossy()]);
+    assert_eq!(run.status, 0, "{}", run.stderr);
+    let text = fs::read_to_string(trace).unwrap();
+    let tenths = |field: &str| field.replace('.', "").parse::<u32>().unwrap();
+    motion(text.lines().skip(1).map(|row| {
+        let fields: Vec<&str> = row.split(',').collect();
+        [fields[4], fields[5], fields[6]].map(tenths)
+    }))
+}
+
+#[test]
+fn every_example_moves_the_servos_exactly_as_on_the_desktop() {
+    let mut names = BTreeSet::new();
+    for entry in fs::read_dir(EXAMPLES).unwrap() {
+        names.insert(entry.unwrap().path());
+    }
+    assert!(names.len() >= 4, "{names:?}");
+    for file in names {
+        let mut machine = Machine::boot(Time::Virtual);
+        let mut client = machine.client();
+        let text = fs::read_to_string(&file).unwrap();
+        let lines: Vec<&str> = text
+            .lines()
+            .filter(|line| !line.trim().is_empty())
+            .collect();
+        // Some ahead, as clients of slow links do it: the arm is never kept waiting for long.
+        const AHEAD: usize = 8;
+        for (number, line) in lines.iter().enumerate() {
+            client.send(format!("{line}\n"));
+            if number >= AHEAD {
+                let reply = client.reply();
+                assert!(reply.starts_with("ok "), "{}: {reply:?}", file.display());
+            }
+        }
+        for _ in 0..AHEAD {
+            client.reply();
+        }
+        client.wait_for_place("ok X:1000 Y:1000 Z:1000");
+        let expected = desktop_motion(&file);
+        // The last records are on their way.
+        let mut seen = Vec::new();
+        for _ in 0..100 {
+            let frames = machine.frames_so_far(&mut seen);
+            if frames.len() >= expected.len() {
+                break;
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+        let moved = motion(seen);
+        let differs = moved
+            .iter()
+            .zip(&expected)
+            .position(|(moved, expected)| moved != expected);
+        assert_eq!(
+            differs,
+            None,
+            "{}: the first pulses that differ",
+            file.display()
+        );
+        assert_eq!(moved.len(), expected.len(), "{}", file.display());
+    }
+}
+
+impl Machine {
+    /// Adds the pulses recorded since the last time, and gives the motion of all of them.
+    fn frames_so_far(&mut self, seen: &mut Vec<Pulses>) -> Vec<Pulses> {
+        let frames = self.frames();
+        seen.extend(
+            frames
+                .iter()
+                .map(|frame| frame.set_point.pulses.map(|pulse| pulse.get())),
+        );
+        motion(seen.iter().copied())
+    }
+}
+
+#[test]
+fn two_clients_draw_at_once() {
+    let machine = Machine::boot(Time::Wall);
+    let (mut one, mut other) = (machine.client(), machine.client());
+    assert_eq!(one.say("G54 X100"), "ok ");
+    assert_eq!(one.say("G01 X1000 Y900 Z1000"), "ok X:1100 Y:900 Z:1000");
+    assert_eq!(other.say("G01 X1000 Y900"), "ok X:1000 Y:900 Z:1000");
+    one.wait_for_place("ok X:1000 Y:900 Z:1000");
+    assert_eq!(other.say("M114"), "ok X:1000 Y:900 Z:1000");
+}
+
+#[test]
+fn a_fifth_client_is_told_and_its_place_becomes_free() {
+    let machine = Machine::boot(Time::Wall);
+    let mut four: Vec<Client> = (0..4).map(|_| machine.client()).collect();
+    let reply = Client::connect(machine.address).reply();
+    assert!(reply.starts_with("error INFO:\""), "{reply:?}");
+    four.pop();
+    for _ in 0..100 {
+        if Client::connect(machine.address)
+            .reply()
+            .starts_with("hello ")
+        {
+            return;
+        }
+        thread::sleep(Duration::from_millis(50));
+    }
+    panic!("nobody is let in although one has left");
+}
+
+#[test]
+fn a_flood_of_two_thousand_commands_is_answered_in_order() {
+    let machine = Machine::boot(Time::Virtual);
+    let mut client = machine.client();
+    let mut sender = client.stream().try_clone().unwrap();
+    let sending = thread::spawn(move || {
+        use std::io::Write;
+        for number in 0..2000 {
+            let (x, y) = (1000 + number % 100, 500 + number / 100);
+            sender
+                .write_all(format!("G01 X{x} Y{y} Z0\n").as_bytes())
+                .unwrap();
+        }
+    });
+    for number in 0..2000 {
+        let (x, y) = (1000 + number % 100, 500 + number / 100);
+        assert_eq!(client.reply(), format!("ok X:{x} Y:{y} Z:0"));
+    }
+    sending.join().unwrap();
+}
+
+#[test]
+fn a_client_that_dies_in_mid_move_leaves_the_arm_usable_and_the_pen_is_lifted() {
+    let mut machine = Machine::boot(Time::Virtual);
+    let mut client = machine.client();
+    client.say("G01 Z0");
+    client.say("G01 X1700 Y0");
+    client.die();
+    let mut other = machine.client();
+    // Five seconds after the end of the connection; nothing else has it moved.
+    other.wait_for_place("ok X:1700 Y:0 Z:1000");
+    assert_eq!(other.say("G28"), "ok X:1000 Y:1000 Z:1000");
+    other.wait_for_place("ok X:1000 Y:1000 Z:1000");
+    machine.frames();
+}
+
+#[test]
+fn settings_survive_a_power_cycle() {
+    let machine = Machine::boot(Time::Wall);
+    let mut client = machine.client();
+    assert_eq!(
+        client.say("M550 Probs-lineus"),
+        "ok MACHINENAME:robs-lineus"
+    );
+    client.say("G01 X1020 Y990 Z950");
+    assert_eq!(client.say("M374"), "ok ");
+    let calibration = calibration_of(&mut client);
+    assert_ne!(calibration, "0.00,0.00,0.00");
+    let machine = machine.power_cycle();
+    let mut client = machine.client();
+    assert_eq!(client.say("M550"), "ok MACHINENAME:robs-lineus");
+    assert_eq!(calibration_of(&mut client), calibration);
+}
+
+fn calibration_of(client: &mut Client) -> String {
+    let reply = client.say("M122");
+    let found = reply
+        .split(' ')
+        .find_map(|token| token.strip_prefix("Cal:"));
+    found.unwrap_or_else(|| panic!("{reply:?}")).to_owned()
+}
+
+#[test]
+fn the_button_and_m587_change_the_network_and_the_light_shows_it() {
+    let mut machine = Machine::boot(Time::Wall);
+    // Nothing is stored: the setup network, flashing red.
+    machine.wait_for_light([64, 0, 0]);
+    let mut client = machine.client();
+    assert_eq!(client.say("M587 Squill-test P\"wrong horse\""), "ok ");
+    machine
+        .emulator
+        .wait_for_line("refuses the password", PATIENCE)
+        .unwrap();
+    machine.wait_for_light([64, 0, 0]);
+    assert_eq!(client.say("M587 Squill-test P\"correct horse\""), "ok ");
+    machine
+        .emulator
+        .wait_for_line("network joined", PATIENCE)
+        .unwrap();
+    machine.wait_for_light([0, 0, 64]);
+    machine.emulator.say("button down").unwrap();
+    machine
+        .emulator
+        .wait_for_line("setup network opened", PATIENCE)
+        .unwrap();
+    machine.emulator.say("button up").unwrap();
+    let mut machine = machine.power_cycle();
+    machine
+        .emulator
+        .wait_for_line("network joined", PATIENCE)
+        .unwrap();
+}
+
+impl Machine {
+    fn wait_for_light(&mut self, wanted: [u8; 3]) {
+        for _ in 0..400 {
+            for record in self.emulator.records().unwrap() {
+                if matches!(record, Record::Light { colour, .. } if colour == wanted) {
+                    return;
+                }
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+        panic!("the light never shows {wanted:?}");
+    }
+}
+
+#[test]
+fn a_panic_is_told_and_ends_the_machine_with_a_status() {
+    let mut machine = Machine::boot(Time::Wall);
+    machine.emulator.say("panic").unwrap();
+    machine
+        .emulator
+        .wait_for_line("the host asked for a panic", PATIENCE)
+        .unwrap();
+    let status = machine.emulator.wait_off(PATIENCE).unwrap();
+    assert_eq!(status.code(), Some(101));
+}
+
+#[test]
+fn no_frame_is_late_or_missing_while_two_clients_flood() {
+    let mut machine = Machine::boot(Time::Virtual);
+    let floods: Vec<_> = (0..2)
+        .map(|client| {
+            let mut flooder = machine.client();
+            thread::spawn(move || {
+                for number in 0..1500 {
+                    flooder.send(format!(
+                        "G01 X{} Y{} Z0\nM114\n",
+                        1000 + number % 200,
+                        200 * client
+                    ));
+                    flooder.reply();
+                    flooder.reply();
+                }
+            })
+        })
+        .collect();
+    for flood in floods {
+        flood.join().unwrap();
+    }
+    let frames = machine.frames();
+    let moving = frames.iter().filter(|frame| frame.set_point.moving).count();
+    assert!(moving > 1500, "{moving} frames in motion");
+    let worst = frames.iter().max_by_key(|frame| frame.late).unwrap();
+    assert!(worst.late == 0, "{} us late: {worst:?}", worst.late);
+    println!(
+        "{} frames, {moving} in motion, none missing, none late",
+        frames.len()
+    );
+}
