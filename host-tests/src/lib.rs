@@ -1,5 +1,5 @@
 //! Tests of Quill from outside, and what they need: an independent model of the arm ([`model`]), the
-//! core's session and machine without a firmware around them ([`bench`]), and the desktop arm as a
+//! core's session and machine without a firmware around them ([`mod@bench`]), and the desktop arm as a
 //! process with clients over TCP ([`desktop`]).
 
 pub mod bench;

@@ -64,3 +64,18 @@ fn clearing_the_calibration_in_motion_does_not_shorten_the_move() {
         assert!((x - 1015.0).abs() < 0.01, "X {x}, frames of {frame_us} us");
     }
 }
+
+#[test]
+fn the_frame_that_shows_a_move_complete_belongs_to_it() {
+    for frame_us in FRAMES_US {
+        let mut arm = arm(frame_us);
+        arm.say(0, "G01 X1015");
+        let last = arm.rest();
+        assert_eq!(last.position, Position::from_units(1015, 1000, 1000));
+        assert!(
+            last.moving,
+            "said to be at rest on its way, frames of {frame_us} us"
+        );
+        assert!(!arm.tick().moving, "frames of {frame_us} us");
+    }
+}

@@ -1,8 +1,8 @@
 //! An independent f64 model of the drawing arm: the oracle of the golden tests.
 //!
 //! It is written from `reference/arm.md` (geometry) and `reference/line-us.md` section 4 (moves) alone, shares no code
-//! with it, and prefers being checkable by eye to being fast. [`arm`] holds the kinematics and the servos,
-//! [`area`] the drawing area, [`gcode`] reads lines, [`motion`] turns a program into set-points.
+//! with it, and prefers being checkable by eye to being fast. `arm` holds the kinematics and the servos,
+//! `area` the drawing area, `gcode` reads lines, `motion` turns a program into set-points.
 //!
 //! Units everywhere: arm units (20 = 1 mm), degrees, microseconds. Triples are x, y, z or shoulder, elbow, pen.
 

@@ -189,10 +189,15 @@ fn sleeper(arm: &Desktop) -> Client {
 fn replies_that_a_client_was_too_slow_for_are_lost_whole() {
     let (_folder, arm) = arm("max");
     let mut sleeper = sleeper(&arm);
-    sleeper.send("M550\n");
     assert!(sleeper.reply().starts_with("hello "));
     let mut count = 0;
+    let mut asked = false;
     loop {
+        if !asked && !sleeper.has_whole_reply_within(Duration::from_millis(500)) {
+            // The rest of a reply that went out in part comes before the next one.
+            sleeper.send("M550\n");
+            asked = true;
+        }
         let reply = sleeper.reply();
         if reply == "ok MACHINENAME:line-us" {
             break;
