@@ -18,6 +18,7 @@ const CONNECTIONS: usize = 5;
 
 type Connections = Tcp<CONNECTIONS, 2048, 2048>;
 
+/// Never returns.
 #[riscv_rt::entry]
 fn main() -> ! {
     let devices = virt::start();

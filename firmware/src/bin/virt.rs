@@ -42,6 +42,7 @@ const AIR: &[OnAir] = &[OnAir {
     signal_dbm: -50,
 }];
 
+/// Never returns.
 #[riscv_rt::entry]
 fn main() -> ! {
     let devices = virt::start();

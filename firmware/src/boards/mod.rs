@@ -4,10 +4,22 @@
 pub mod desktop;
 #[cfg(feature = "embassy-tcp")]
 pub mod embassy_tcp;
+#[cfg(feature = "esp")]
+pub mod esp;
 #[cfg(any(feature = "desktop", feature = "virt"))]
 pub mod scripted_radio;
 #[cfg(feature = "virt")]
 pub mod virt;
+
+// Data of the ESP32 boards, one file each; `esp::data` explains it.
+#[cfg(feature = "esp32")]
+mod esp32;
+#[cfg(feature = "esp32c3")]
+mod esp32c3;
+#[cfg(feature = "esp32c6")]
+mod esp32c6;
+#[cfg(feature = "esp32s3")]
+mod esp32s3;
 
 /// Where the settings are in a flash of 4 MB; `partitions.csv` is the whole layout.
 pub const SETTINGS: core::ops::Range<u32> = 0x29_0000..0x29_8000;

@@ -55,6 +55,14 @@ impl Store {
         self.outcome.wait().await
     }
 
+    /// The storage service of a board without memory: nothing is stored, and everybody is told so.
+    pub async fn refuse(&self) -> ! {
+        loop {
+            self.request.wait().await;
+            self.outcome.signal(Err(StoreError));
+        }
+    }
+
     /// The storage service: writes what [`Self::save`] is given, for ever.
     pub async fn run<F: NorFlash>(&self, mut memory: Memory<F>) -> ! {
         loop {

@@ -25,6 +25,7 @@ const POINTS: [[f32; 3]; 5] = [
     [700.0, -1500.0, 0.0],
 ];
 
+/// Never returns.
 #[riscv_rt::entry]
 fn main() -> ! {
     core_work::report();

@@ -1,0 +1,114 @@
+//! From reset to a board with everything in its place.
+
+use super::Button;
+use super::data::BOARD;
+use super::flash::{self, FlashPartition};
+use super::interface::Interfaces;
+use super::light::{Light, PwmPower};
+use super::net::{Net, NetRunner};
+use super::pins::pin;
+use super::radio::EspRadio;
+use super::serial::{self, SerialRx, SerialTx};
+use super::servos::ServoPorts;
+use super::system::Watchdog;
+use embassy_executor::SendSpawner;
+use esp_hal::clock::CpuClock;
+use esp_hal::gpio::{Input, InputConfig, Pull};
+use esp_hal::interrupt::Priority;
+use esp_hal::timer::timg::TimerGroup;
+use esp_rtos::embassy::InterruptExecutor;
+use static_cell::StaticCell;
+
+/// Memory that the bootloader no longer needs; the chips have 64 kB or a little more.
+const HEAP_RECLAIMED: usize = 64 * 1024;
+/// Heap out of ordinary RAM. The radio's buffers come from it: 10 x 1.6 kB at the start, up to 64
+/// more of them under load, and its tasks' stacks. Where it runs out the driver drops packets.
+const HEAP_MORE: usize = 72 * 1024;
+
+/// The software interrupt of the servo tick. 0 is the scheduler's, 1 the second core's.
+type UrgentExecutor = InterruptExecutor<2>;
+
+/// The board, ready for its tasks.
+pub struct Parts {
+    /// Servo outputs, for the servo tick.
+    pub servos: ServoPorts,
+    /// Where the servo tick is spawned: above network and radio, whose interrupts have the lowest
+    /// priority. Its tasks run on the stack of whatever they interrupt: keep their frames small.
+    pub urgent: SendSpawner,
+    /// Status light.
+    pub light: Light,
+    /// Button.
+    pub button: Button,
+    /// G-code from the computer; `None` if the port could not be opened.
+    pub serial: Option<(SerialRx, SerialTx)>,
+    /// Flash for the settings; `None` if the partition table has no such place.
+    pub settings: Option<FlashPartition>,
+    /// Radio and network stack; `None` if they could not be started.
+    pub network: Option<Network>,
+    /// Watchdog, not yet started.
+    pub watchdog: Watchdog,
+}
+
+/// The way to the outside.
+pub struct Network {
+    /// The radio.
+    pub radio: EspRadio,
+    /// The network stack.
+    pub net: Net,
+    /// Its task.
+    pub runner: NetRunner,
+}
+
+/// Starts clocks, memory, scheduler and all drivers. Call once, first thing in `main`.
+pub fn parts() -> Parts {
+    let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
+    heap();
+    let timers = TimerGroup::new(chip.TIMG0);
+    esp_rtos::start(timers.timer0, chip.FROM_CPU_INTR0);
+
+    static URGENT: StaticCell<UrgentExecutor> = StaticCell::new();
+    let urgent = URGENT
+        .init(UrgentExecutor::new(chip.FROM_CPU_INTR2))
+        .start(Priority::max());
+
+    let power = PwmPower::on(chip.LEDC);
+    let servos = ServoPorts {
+        pins: [
+            pin(BOARD.shoulder.pin),
+            pin(BOARD.elbow.pin),
+            pin(BOARD.pen.pin),
+        ],
+        power,
+    };
+
+    let [settings] = flash::open(chip.FLASH, ["settings"]);
+    let pull_up = InputConfig::default().with_pull(Pull::Up);
+    let serial = serial::open(chip.UART0, &BOARD.serial);
+    if let Err(error) = &serial {
+        defmt::error!("serial port: {}", error);
+    }
+    let network =
+        EspRadio::start(chip.WIFI)
+            .ok()
+            .zip(Interfaces::take())
+            .map(|(radio, interfaces)| {
+                let (net, runner) = Net::start(interfaces);
+                Network { radio, net, runner }
+            });
+
+    Parts {
+        servos,
+        urgent,
+        light: Light::new(&BOARD.light, chip.RMT, power),
+        button: Input::new(pin(BOARD.button_pin), pull_up),
+        serial: serial.ok(),
+        settings,
+        network,
+        watchdog: Watchdog::new(timers.wdt),
+    }
+}
+
+fn heap() {
+    esp_alloc::heap_allocator!(#[esp_hal::ram(reclaimed)] size: HEAP_RECLAIMED);
+    esp_alloc::heap_allocator!(size: HEAP_MORE);
+}
