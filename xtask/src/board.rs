@@ -66,11 +66,36 @@ impl Board {
 
     /// Builds one of the firmware's binaries, and gives the file.
     pub fn build(self, binary: &str, extra_features: &[&str], setup: bool) -> Result<PathBuf> {
-        let profile = if self == Self::Desktop {
+        let mut cargo = self.cargo("build", extra_features, setup)?;
+        run(cargo.args(["--bin", binary]))?;
+        let mut file = target_dir();
+        file.extend(self.target());
+        file.extend([self.profile(), binary]);
+        if !file.exists() {
+            bail!("{} is not where cargo should have put it", file.display());
+        }
+        Ok(file)
+    }
+
+    /// Looks for what clippy finds in the library and the given binaries.
+    pub fn lint(self, binaries: &[&str], extra_features: &[&str], setup: bool) -> Result<()> {
+        let mut cargo = self.cargo("clippy", extra_features, setup)?;
+        cargo.arg("--lib");
+        for binary in binaries {
+            cargo.args(["--bin", binary]);
+        }
+        run(cargo.args(["--", "-D", "warnings"]))
+    }
+
+    const fn profile(self) -> &'static str {
+        if matches!(self, Self::Desktop) {
             "release"
         } else {
             "chip"
-        };
+        }
+    }
+
+    fn cargo(self, verb: &str, extra_features: &[&str], setup: bool) -> Result<Command> {
         let mut cargo = match self.target() {
             None => Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into())),
             Some(target) => Toolchain::find(target, setup)?.cargo(target),
@@ -79,21 +104,13 @@ impl Board {
         features.extend(extra_features);
         cargo
             .current_dir(root())
-            .args(["build", "--package", "firmware", "--bin", binary])
-            .args(["--profile", profile, "--no-default-features"])
+            .args([verb, "--locked", "--package", "firmware"])
+            .args(["--profile", self.profile(), "--no-default-features"])
             .args(["--features", &features.join(",")]);
         if let Some(target) = self.target() {
             cargo.args(["--target", target]);
         }
-        run(&mut cargo)?;
-        let folder = if profile == "chip" { "chip" } else { "release" };
-        let mut file = target_dir();
-        file.extend(self.target());
-        file.extend([folder, binary]);
-        if !file.exists() {
-            bail!("{} is not where cargo should have put it", file.display());
-        }
-        Ok(file)
+        Ok(cargo)
     }
 }
 

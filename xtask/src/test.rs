@@ -37,6 +37,12 @@ pub fn everything(setup: bool) -> Result<()> {
         run(cargo().args(["test", "--workspace", "--locked"]))
     })?;
     step("fuzzing", fuzz)?;
+    step("lints for the chips", || {
+        Board::Virt.lint(&["virt", "echo", "bench"], &["bench"], setup)?;
+        Board::CHIPS
+            .into_iter()
+            .try_for_each(|board| board.lint(&["esp", "bare"], &[], setup))
+    })?;
     step("emulator", || {
         let firmware = Board::Virt.build(Board::Virt.binary(), &[], setup)?;
         run(cargo()

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Debian's packages with a compiler and its library sources (security pocket of Debian 12).
-const COMPILER_PACKAGES: [&str; 5] = [
+const COMPILER_PACKAGES: [&str; 6] = [
     "rustc-web",
     "cargo-web",
     "rust-web-src",
     "rust-web-llvm",
+    "rust-web-clippy",
     "lld-22",
 ];
 /// The distribution's compiler, whatever `PATH` says.
@@ -117,7 +118,10 @@ fn system() -> Option<Toolchain> {
         .ok()?;
     let sysroot = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
     let sources = sysroot.join("lib/rustlib/src/rust/library/core");
-    if !Path::new(SYSTEM_CARGO).exists() || !sources.exists() {
+    let complete = [SYSTEM_CARGO, "/usr/bin/cargo-clippy"]
+        .into_iter()
+        .all(|tool| Path::new(tool).exists());
+    if !complete || !sources.exists() {
         return None;
     }
     let linker = ["/usr/bin/rust-lld", "/usr/bin/lld-22"]

@@ -5,10 +5,11 @@
 use core::net::{Ipv4Addr, SocketAddr};
 use edge_nal::TcpBind;
 use embassy_executor::{SpawnError, Spawner};
+use embassy_futures::select::{Either, select};
 use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::Duration;
+use embassy_time::{Duration, Timer};
 use firmware::boards::SETTINGS;
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
 use firmware::boards::scripted_radio::{OnAir, ScriptedRadio};
@@ -69,7 +70,17 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         log::error!("the settings do not lie in whole pages");
         return;
     };
-    let settings = memory.load().await;
+    // QEMU that takes no sleep (`-icount sleep=off`) now and then forgets a disk that answers while no
+    // alarm is set: so there is one.
+    let alarm = async {
+        loop {
+            Timer::after_millis(1).await;
+        }
+    };
+    let settings = match select(memory.load(), alarm).await {
+        Either::First(settings) => settings,
+        Either::Second(never) => never,
+    };
     let identity = Identity {
         mac: card.address(),
     };

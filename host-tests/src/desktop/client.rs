@@ -90,6 +90,14 @@ impl Client {
         chunk
     }
 
+    /// What comes first, as it comes; empty if the connection is closed instead.
+    pub fn first_words(mut self) -> Vec<u8> {
+        let mut chunk = vec![0; 256];
+        let length = self.stream.read(&mut chunk).unwrap_or(0);
+        chunk.truncate(length);
+        chunk
+    }
+
     /// Whether nothing arrives for a while.
     ///
     /// # Panics

@@ -67,7 +67,7 @@ pub fn start() -> Option<Devices> {
             DeviceType::Network => card = Some(net::VirtNet::new(device)),
             DeviceType::Block => disk = Some(flash::Flash::new(device)),
             DeviceType::Console if recorder.is_none() => {
-                recorder = Some(world::Recorder::new(device))
+                recorder = Some(world::Recorder::new(device));
             }
             DeviceType::Console => {
                 console::attach(&device);
