@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -70,6 +71,8 @@ impl Emulator {
         let qemu = command(firmware, options, &records, &socket)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
+            // Ctrl-C is for whoever drives the machine, not for the machine.
+            .process_group(0)
             .spawn()
             .with_context(|| format!("cannot start {}", QEMU.0))?;
         let mut emulator = Self {
