@@ -2,6 +2,7 @@
 //! that survives, and servos of which every pulse is read back.
 
 use host_tests::desktop::{Client, draw};
+use protocol_core::motion::PEN_UP;
 use std::collections::BTreeSet;
 use std::fs;
 use std::net::SocketAddr;
@@ -243,6 +244,34 @@ fn a_client_that_dies_in_mid_move_leaves_the_arm_usable_and_the_pen_is_lifted() 
     assert_eq!(other.say("G28"), "ok X:1000 Y:1000 Z:1000");
     other.wait_for_place("ok X:1000 Y:1000 Z:1000");
     machine.frames();
+}
+
+#[test]
+fn the_pen_is_lifted_when_the_link_dies_and_the_place_becomes_free() {
+    let mut machine = Machine::boot(Time::Virtual);
+    let mut clients: Vec<Client> = (0..4).map(|_| machine.client()).collect();
+    clients[0].say("G01 X1400 Y0 Z0");
+    clients[0].wait_for_place("ok X:1400 Y:0 Z:0");
+    machine.emulator.connect_cable(false).unwrap();
+    thread::sleep(Duration::from_millis(20));
+    let down = machine.frames().last().unwrap().set_point.position;
+    assert!(down.pen_is_down(), "{down:?}");
+    // No word of the end reaches the arm: keep-alives find out, and the pen has its five seconds.
+    let mut up = false;
+    for _ in 0..1500 {
+        up |= machine
+            .frames()
+            .iter()
+            .any(|frame| frame.set_point.position.z == PEN_UP && frame.set_point.moving);
+        if up {
+            break;
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+    assert!(up, "the pen stays down");
+    machine.emulator.connect_cable(true).unwrap();
+    let mut other = machine.client();
+    assert_eq!(other.say("M114"), "ok X:1400 Y:0 Z:1000");
 }
 
 #[test]

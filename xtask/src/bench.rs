@@ -103,7 +103,7 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
 /// Runs a program that prints `name,instructions` lines on the serial port.
 fn run_bench(program: &Path) -> Result<Vec<(String, u64)>> {
     let output = machine(program, Time::Instructions)
-        .args(["-serial", "stdio"])
+        .args(["-serial", "stdio", "-monitor", "none"])
         .stdin(Stdio::null())
         .stderr(Stdio::inherit())
         .output()?;

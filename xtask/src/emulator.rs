@@ -19,6 +19,11 @@ pub const QEMU: (&str, &str) = ("qemu-system-riscv32", "qemu-system-misc");
 /// Bytes of the flash.
 pub const FLASH_SIZE: u64 = 4 << 20;
 
+// Files and sockets in the machine's folder.
+const RECORDS: &str = "records";
+const CONSOLE: &str = "console";
+const MONITOR: &str = "monitor";
+
 /// How to start the machine.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -64,11 +69,10 @@ impl Emulator {
                 .with_context(|| options.flash.display().to_string())?;
         }
         let folder = tempfile::tempdir()?;
-        let records = folder.path().join("records");
+        let records = folder.path().join(RECORDS);
         File::create(&records)?;
-        let socket = folder.path().join("console");
-        let listener = UnixListener::bind(&socket)?;
-        let qemu = command(firmware, options, &records, &socket)
+        let listener = UnixListener::bind(folder.path().join(CONSOLE))?;
+        let qemu = command(firmware, options, folder.path())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             // Ctrl-C is for whoever drives the machine, not for the machine.
@@ -137,6 +141,23 @@ impl Emulator {
         Ok(writeln!(self.console, "{line}")?)
     }
 
+    /// Cuts the network cable, or plugs it in again: packets vanish, and nobody is told.
+    pub fn connect_cable(&mut self, connected: bool) -> Result<()> {
+        let mut monitor = UnixStream::connect(self.folder.path().join(MONITOR))?;
+        let state = if connected { "on" } else { "off" };
+        writeln!(monitor, "set_link n0 {state}")?;
+        // The prompt after the command's echo says that it is done.
+        let mut heard = Vec::new();
+        let mut byte = [0];
+        while heard.windows(7).filter(|text| text == b"(qemu) ").count() < 2 {
+            if monitor.read(&mut byte)? == 0 {
+                bail!("the monitor is gone");
+            }
+            heard.extend_from_slice(&byte);
+        }
+        Ok(())
+    }
+
     /// What has been recorded since the last call.
     pub fn records(&mut self) -> Result<Vec<Record>> {
         self.recorded.read_to_end(&mut self.bytes)?;
@@ -176,9 +197,12 @@ pub fn free_address() -> Result<SocketAddr> {
     Ok(TcpListener::bind("127.0.0.1:0")?.local_addr()?)
 }
 
-fn command(firmware: &Path, options: &Options, records: &Path, console: &Path) -> Command {
+fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
+    let [records, console, monitor] = [RECORDS, CONSOLE, MONITOR].map(|name| folder.join(name));
     let mut qemu = machine(firmware, options.time);
     qemu.args(["-serial", "none"])
+        .arg("-monitor")
+        .arg(format!("unix:{},server=on,wait=off", monitor.display()))
         .arg("-chardev")
         // A file keeps everything; a socket would lose what is not read at once.
         .arg(format!("file,id=records,path={}", records.display()))
@@ -210,7 +234,7 @@ fn command(firmware: &Path, options: &Options, records: &Path, console: &Path) -
 pub fn machine(program: &Path, time: Time) -> Command {
     let mut qemu = Command::new(QEMU.0);
     qemu.args(["-M", "virt", "-cpu", "rv32", "-m", "16", "-bios", "none"])
-        .args(["-display", "none", "-monitor", "none"])
+        .args(["-display", "none"])
         .args(["-global", "virtio-mmio.force-legacy=false"])
         .arg("-kernel")
         .arg(program);
