@@ -1,7 +1,7 @@
 //! The emulated arm for a person: console, picture and trace, until Ctrl-C.
 
 use crate::Emulate;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use firmware::board::Servos;
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder};
 use protocol_core::machine::ArmData;
@@ -45,7 +45,11 @@ fn follow(
 ) -> Result<()> {
     let mut shown = [[0; 3]; 2];
     while !STOP.load(Ordering::Relaxed) {
-        if let Some(line) = emulator.next_line(Duration::from_millis(50))? {
+        let Ok(next) = emulator.next_line(Duration::from_millis(50)) else {
+            let status = emulator.wait_off(Duration::from_secs(1))?;
+            bail!("the machine has switched itself off: {status}");
+        };
+        if let Some(line) = next {
             println!("{line}");
             if line.contains("Line-us clients") {
                 println!("  on this computer: {line_us}");

@@ -54,7 +54,7 @@ struct Serve {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
-    /// Where the arm keeps its name and calibration, made if it does not exist
+    /// Where the arm keeps its name, calibration and network, made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.state")]
     state: PathBuf,
     /// How fast the arm's time runs: a factor, or 'max' for as fast as possible

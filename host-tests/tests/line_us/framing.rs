@@ -192,7 +192,7 @@ fn a_refusal_names_the_letter_and_changes_nothing() {
         ("G00 X1100 Y\"5", "Y"),
         ("M9999", "M9999"),
         ("M587", "M587"),
-        ("M587 Sx Py", "P is"),
+        ("M587 Sx Py", "P must"),
         ("M588 S*", "M588"),
         ("M997", "M997"),
     ] {

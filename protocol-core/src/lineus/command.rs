@@ -244,8 +244,7 @@ fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         } else {
             let phrase = text.unescape::<MAX_PASSWORD>();
             let phrase = phrase.and_then(|phrase| Password::new(phrase.as_bytes()));
-            // What was typed is a secret, also when it is wrong.
-            password = Some(phrase.ok_or(Refusal::BadText('P', "hidden", "8 to 63 bytes"))?);
+            password = Some(phrase.ok_or(Refusal::BadPassword)?);
         }
     }
     match ssid {

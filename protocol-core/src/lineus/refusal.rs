@@ -2,6 +2,7 @@
 
 use crate::settings::MAX_NAME;
 use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt};
+use crate::wifi::{MAX_PASSWORD, MIN_PASSWORD};
 use core::fmt;
 
 /// Why a line is refused; nothing has changed then.
@@ -32,6 +33,8 @@ pub enum Refusal<'a> {
     ZeroScale,
     /// A text that the parameter cannot have, and what it may be.
     BadText(char, &'a str, &'static str),
+    /// A password of a length that none has; what it is stays a secret.
+    BadPassword,
     /// No machine name.
     BadName(&'a str),
 }
@@ -77,6 +80,7 @@ impl fmt::Display for Refusal<'_> {
             Self::BadText(letter, text, expected) => {
                 write!(out, "{letter} is '{}', it may be {expected}", short(text))
             }
+            Self::BadPassword => write!(out, "P must be {MIN_PASSWORD} to {MAX_PASSWORD} bytes"),
             Self::BadName(text) => write!(
                 out,
                 "P is '{}', a name is 1 to {MAX_NAME} letters, digits and inner hyphens",

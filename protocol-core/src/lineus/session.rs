@@ -253,10 +253,7 @@ mod tests {
             ),
             ("M587 Pcorrect-horse", "parameter S is missing"),
             ("M587 S\"\"", "S is '', it may be 1 to 32 bytes"),
-            (
-                "M587 Shome Pshort",
-                "P is 'hidden', it may be 8 to 63 bytes",
-            ),
+            ("M587 Shome Pshort", "P must be 8 to 63 bytes"),
             ("M587 Shome Qx", "unknown parameter Q"),
             (
                 "M588 S*",
