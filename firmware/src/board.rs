@@ -63,7 +63,8 @@ pub trait Radio {
     /// [`RadioFault`] when the radio could not listen.
     async fn scan<const N: usize>(&mut self, heard: &mut Vec<Heard, N>) -> Result<(), RadioFault>;
 
-    /// Leaves the joined network, if any, and tries this one once. Ends by itself within 20 s.
+    /// Leaves the joined network, if any, and tries this one once. Ends by itself within half a minute. Whoever
+    /// drops it before that calls [`Self::leave`].
     async fn join(&mut self, network: &Network) -> Joined;
 
     /// Leaves the joined network; nothing happens if there is none.

@@ -170,7 +170,7 @@ impl Bench {
             }
             Request::Position => reply.position(self.machine.position()),
             Request::Angles => reply.angles(self.machine.angles()),
-            Request::Capabilities => reply.capabilities(&self.name),
+            Request::Capabilities => reply.capabilities(&self.name, false),
             Request::Diagnostics => reply.diagnostics(&Diagnostics {
                 name: &self.name,
                 identity: IDENTITY,

@@ -281,6 +281,8 @@ impl Machine {
         self.release(client);
         if self.last_mover == Some(client) {
             self.lift_at = Some(self.frame + self.data.lift_after);
+            // Whoever has the same place next has not moved the arm.
+            self.last_mover = None;
         }
     }
 
@@ -337,12 +339,13 @@ impl Machine {
             }
         };
         self.frame = now;
+        let pulses = self.pulses(position);
         self.last = SetPoint {
             position,
-            pulses: self.pulses(position),
+            pulses,
             held: held || self.passed_short,
-            // A move that ended between two frames shows by the place alone.
-            moving: was_moving || self.active.is_some() || position != self.last.position,
+            // A move that ended between two frames shows by the pulses alone.
+            moving: was_moving || self.active.is_some() || pulses != self.last.pulses,
         };
         self.passed_short = false;
         self.last
@@ -358,14 +361,17 @@ impl Machine {
         self.active.is_some() || !self.waiting.is_empty() || self.last.position != self.position
     }
 
-    /// Where the nib is now: the position of the last set-point.
+    /// Where the nib is now: the position of the last set-point, or where the arm rests.
     pub const fn position(&self) -> Position {
-        self.last.position
+        match self.active {
+            Some(_) => self.last.position,
+            None => self.position,
+        }
     }
 
     /// Where the servos are now, in the model's angles.
     pub fn angles(&self) -> Angles {
-        inverse(self.last.position, self.data.lift)
+        inverse(self.position(), self.data.lift)
     }
 
     /// What the board says about the arm.
@@ -395,7 +401,8 @@ impl Machine {
     }
 
     /// Puts a calibration in force. The servos stay where they are, and the arm's position becomes
-    /// what they now mean; where that is outside the drawing area, the arm moves to its edge.
+    /// what they now mean; where that is outside the drawing area or its heights, they go to its edge in
+    /// the next frame.
     pub fn set_calibration(&mut self, calibration: Calibration) {
         let model = calibration.remove(self.told());
         self.calibration = calibration;
@@ -407,18 +414,12 @@ impl Machine {
         let (x, y) = closest(position.x.into(), position.y.into());
         self.position = Position { x, y, ..position };
         self.active = None;
-        self.last.position = self.position;
-        self.last.pulses = self.pulses(self.position);
     }
 
     /// What the servos were told last, or at rest will have been told at the next frame, calibration
     /// included.
     fn told(&self) -> Angles {
-        let position = match self.active {
-            Some(_) => self.last.position,
-            None => self.position,
-        };
-        self.calibration.apply(inverse(position, self.data.lift))
+        self.calibration.apply(self.angles())
     }
 
     #[inline]

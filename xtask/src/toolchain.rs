@@ -37,7 +37,15 @@ impl Toolchain {
     /// The one to use for `target`; with `setup`, installs what is missing.
     pub fn find(target: &str, setup: bool) -> Result<Self> {
         if target.starts_with("xtensa") {
-            return Ok(Self::Espressif);
+            let mut probe = Command::new("cargo");
+            leave_own_cargo(&mut probe);
+            let found = probe.args(["+esp", "--version"]).output();
+            if found.is_ok_and(|found| found.status.success()) {
+                return Ok(Self::Espressif);
+            }
+            bail!(
+                "{target} needs Espressif's compiler: cargo install espup --locked && espup install"
+            );
         }
         if rustup_has(target) {
             return Ok(Self::Rustup);

@@ -12,7 +12,7 @@ use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::flash::{self, FileFlash};
 use firmware::boards::desktop::net::Listener;
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
-use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS};
+use firmware::boards::desktop::{IDENTITY, NoAddress, OWN_NETWORK, VITALS, own_network};
 use firmware::boards::scripted_radio::ScriptedRadio;
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
@@ -192,11 +192,11 @@ async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
         .await;
 }
 
-/// There is no radio here: the network policy runs on one that hears nothing.
+/// There is no radio here: the network policy runs on one that hears the computer's own network alone.
 #[embassy_executor::task]
 async fn wifi(house: &'static House) {
     static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    let radio = ScriptedRadio::new(&[], &CUT);
+    let radio = ScriptedRadio::new(&[OWN_NETWORK], &CUT);
     house.wifi.run(radio, NoAddress, &house.panel).await;
 }
 
@@ -210,7 +210,8 @@ fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<
     let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
     let mut memory =
         memory.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
-    let settings = embassy_futures::block_on(memory.load());
+    let mut settings = embassy_futures::block_on(memory.load());
+    settings.network.get_or_insert_with(own_network);
     let house = House::new(data, settings, IDENTITY, VITALS);
     Ok((Box::leak(Box::new(house)), memory))
 }
@@ -252,7 +253,8 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     let totals = recorder.finish()?;
     bar.finish_and_clear();
     let outcome = *outcome.borrow();
-    tell(&outcome, &totals);
+    // Nobody has to listen.
+    let _ = tell(&outcome, &totals);
     return Ok(if outcome.is_clean() {
         ExitCode::SUCCESS
     } else {
@@ -271,17 +273,20 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     }
 }
 
-fn tell(outcome: &Outcome, totals: &Totals) {
+fn tell(outcome: &Outcome, totals: &Totals) -> io::Result<()> {
+    let mut out = io::stdout().lock();
     let seconds = totals.moving.as_secs_f64();
-    println!("commands        {}", outcome.commands);
-    println!("errors          {}", outcome.errors);
-    println!("strokes         {}", totals.strokes);
-    println!("pen down        {:.1} mm", totals.pen_down_mm);
-    println!("pen up          {:.1} mm", totals.pen_up_mm);
-    println!("points limited  {}", outcome.limited);
-    println!(
+    writeln!(out, "commands        {}", outcome.commands)?;
+    writeln!(out, "errors          {}", outcome.errors)?;
+    writeln!(out, "strokes         {}", totals.strokes)?;
+    writeln!(out, "pen down        {:.1} mm", totals.pen_down_mm)?;
+    writeln!(out, "pen up          {:.1} mm", totals.pen_up_mm)?;
+    writeln!(out, "points limited  {}", outcome.limited)?;
+    writeln!(
+        out,
         "time of the arm {:.0} min {:.1} s",
         (seconds / 60.0).floor(),
         seconds % 60.0
-    );
+    )?;
+    Ok(())
 }

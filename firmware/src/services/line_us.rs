@@ -29,8 +29,10 @@ const CHUNK: usize = 512;
 pub const PATIENCE: Duration = Duration::from_secs(2);
 /// How often a client that did not take the whole of a reply is tried again.
 const RETRY: Duration = Duration::from_millis(100);
-/// How long a client that is being turned away has to read why.
+/// How long a client has to close after its last reply.
 const FAREWELL: Duration = Duration::from_secs(1);
+/// How long a client that is turned away has to read why, while others wait.
+const TURNED_AWAY: Duration = Duration::from_millis(250);
 
 /// The pool of connections.
 #[derive(Default)]
@@ -79,7 +81,7 @@ impl Server {
             if let Either::First(Ok((peer, mut socket))) = accepted {
                 info!("client {} turned away: {} are connected", peer, MAX_CLIENTS);
                 // Whether it hears it is up to the client.
-                let _ = with_timeout(FAREWELL, farewell(&mut socket)).await;
+                let _ = with_timeout(TURNED_AWAY, farewell(&mut socket)).await;
             }
         }
     }
@@ -150,7 +152,7 @@ async fn perform(request: Request, reply: &mut Reply, client: Client, house: &Ho
         }
         Request::Position => reply.position(arm.with(|machine| machine.position())),
         Request::Angles => reply.angles(arm.with(|machine| machine.angles())),
-        Request::Capabilities => reply.capabilities(&house.name()),
+        Request::Capabilities => reply.capabilities(&house.name(), house.wifi.is_setup()),
         Request::Diagnostics => diagnose(reply, house),
         Request::Name => reply.name(&house.name()),
         Request::Rename(name) => rename(name, reply, client, house).await,

@@ -8,6 +8,7 @@ use super::panel::{Lamp, Panel};
 use crate::board::{Address, Radio};
 use crate::log::{info, warning};
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_futures::select::{Either, Either3, select, select3};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -17,6 +18,8 @@ use protocol_core::wifi::{Joined, Network, Ssid};
 
 /// Name of the machine's own, open network.
 pub const SETUP_SSID: &[u8] = b"Line-us-Setup";
+/// Time for the reply to `M587` to reach its client before the network changes.
+const GRACE: Duration = Duration::from_millis(500);
 /// Pause before a lost network is tried again.
 const RETRY: Duration = Duration::from_secs(5);
 
@@ -24,6 +27,7 @@ const RETRY: Duration = Duration::from_secs(5);
 pub struct Wifi {
     stored: Mutex<CriticalSectionRawMutex, RefCell<Option<Network>>>,
     changed: Signal<CriticalSectionRawMutex, ()>,
+    is_setup: AtomicBool,
 }
 
 /// What the machine is to be next.
@@ -38,6 +42,7 @@ impl Wifi {
         Self {
             stored: Mutex::new(RefCell::new(stored)),
             changed: Signal::new(),
+            is_setup: AtomicBool::new(false),
         }
     }
 
@@ -46,6 +51,17 @@ impl Wifi {
         self.stored
             .lock(|stored| *stored.borrow_mut() = Some(network));
         self.changed.signal(());
+    }
+
+    /// Whether the machine is on its own network, for setup.
+    pub fn is_setup(&self) -> bool {
+        self.is_setup.load(Ordering::Relaxed)
+    }
+
+    /// Waits for another network, and a little longer: the reply that says so is on its way still.
+    async fn changed(&self) {
+        self.changed.wait().await;
+        Timer::after(GRACE).await;
     }
 
     /// The network policy, for ever.
@@ -61,22 +77,30 @@ impl Wifi {
 
     /// Stays in the stored network until there is something else to do.
     async fn station(&self, radio: &mut impl Radio, address: &impl Address, panel: &Panel) -> Mode {
+        self.is_setup.store(false, Ordering::Relaxed);
         panel.show(Lamp::Searching);
         let mut was_joined = false;
         loop {
             let Some(network) = self.stored.lock(|stored| stored.borrow().clone()) else {
                 return Mode::Setup;
             };
-            let joined = radio.join(&network).await;
+            let joined = match select(radio.join(&network), panel.pressed()).await {
+                Either::First(joined) => joined,
+                Either::Second(()) => {
+                    radio.leave().await;
+                    return Mode::Setup;
+                }
+            };
             match joined {
                 Joined::Yes => {
                     info!("network joined");
                     address.ask();
                     panel.show(Lamp::Connected);
                     was_joined = true;
-                    match select3(radio.lost(), self.changed.wait(), panel.pressed()).await {
+                    match select3(radio.lost(), self.changed(), panel.pressed()).await {
                         Either3::First(()) => warning!("network lost"),
-                        Either3::Second(()) => {}
+                        // The new one has to show first that it can be joined.
+                        Either3::Second(()) => was_joined = false,
                         Either3::Third(()) => {
                             radio.leave().await;
                             return Mode::Setup;
@@ -92,10 +116,10 @@ impl Wifi {
             if !was_joined {
                 return Mode::Setup;
             }
-            if let Either3::Third(()) =
-                select3(Timer::after(RETRY), self.changed.wait(), panel.pressed()).await
-            {
-                return Mode::Setup;
+            match select3(Timer::after(RETRY), self.changed(), panel.pressed()).await {
+                Either3::First(()) => {}
+                Either3::Second(()) => was_joined = false,
+                Either3::Third(()) => return Mode::Setup,
             }
         }
     }
@@ -109,14 +133,16 @@ impl Wifi {
             ssid,
             password: None,
         };
+        self.is_setup.store(true, Ordering::Relaxed);
         panel.show(Lamp::Setup);
+        panel.forget_press();
         if radio.open_access_point(&own).await.is_err() {
             warning!("setup network not opened");
             panel.show(Lamp::Error);
             Timer::after(RETRY).await;
         } else {
             info!("setup network opened");
-            let until = select(self.changed.wait(), panel.pressed());
+            let until = select(self.changed(), panel.pressed());
             match select(address.serve_guests(), until).await {
                 Either::First(never) => never,
                 Either::Second(_) => {}

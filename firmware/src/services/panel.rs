@@ -75,6 +75,11 @@ impl Panel {
         self.press.wait().await;
     }
 
+    /// A press before now is not meant for what comes next.
+    pub fn forget_press(&self) {
+        self.press.reset();
+    }
+
     /// The light, for ever.
     pub async fn shine(&self, mut light: impl Light) -> ! {
         let mut lamp = Lamp::Starting;

@@ -1,6 +1,6 @@
 //! What the arm remembers when it is started again.
 
-use host_tests::desktop::Desktop;
+use host_tests::desktop::{Desktop, binary};
 use std::fs;
 use std::path::Path;
 
@@ -88,22 +88,25 @@ fn a_name_can_be_changed_hundreds_of_times() {
     assert_eq!(reply, "ok MACHINENAME:a-rather-long-name-699");
 }
 
-#[test]
-fn a_state_file_of_garbage_starts_with_defaults_and_can_be_used() {
+/// Noise of a length.
+fn garbage(length: usize) -> Vec<u8> {
     let mut noise: u32 = 1;
-    let garbage: Vec<u8> = (0..40_000)
+    (0..length)
         .map(|_| {
             noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (noise >> 24) as u8
         })
-        .collect();
+        .collect()
+}
+
+const STATE_SIZE: usize = 32 * 1024;
+
+#[test]
+fn a_state_file_of_garbage_starts_with_defaults_and_can_be_used() {
     for contents in [
-        &garbage[..],
-        &garbage[..10],
-        &[0; 32 * 1024],
-        &[0; 5000],
-        b"not a flash at all\n",
-        b"",
+        garbage(STATE_SIZE),
+        vec![0; STATE_SIZE],
+        vec![0x55; STATE_SIZE],
     ] {
         let folder = folder();
         fs::write(folder.path().join("state"), contents).expect("a file can be written");
@@ -113,36 +116,47 @@ fn a_state_file_of_garbage_starts_with_defaults_and_can_be_used() {
         assert_eq!(arm.client().say("M550 Pafter"), "ok MACHINENAME:after");
         arm.cut_power();
         let arm = start(folder.path());
-        assert_eq!(
-            arm.client().say("M550"),
-            "ok MACHINENAME:after",
-            "over {} bytes of garbage",
-            contents.len()
-        );
+        assert_eq!(arm.client().say("M550"), "ok MACHINENAME:after");
     }
 }
 
 #[test]
-fn a_torn_state_file_still_starts() {
+fn a_file_that_is_no_state_stays_as_it_is() {
+    for contents in [&b"not a flash at all\n"[..], b"", &garbage(STATE_SIZE + 1)] {
+        let folder = folder();
+        let file = folder.path().join("state");
+        fs::write(&file, contents).expect("a file can be written");
+        let run = std::process::Command::new(binary())
+            .args(["--line-us", "127.0.0.1:0", "--picture"])
+            .arg(folder.path().join("picture.svg"))
+            .arg("--state")
+            .arg(&file)
+            .output()
+            .expect("the desktop arm's program can be started");
+        assert_eq!(run.status.code(), Some(1));
+        let why = String::from_utf8_lossy(&run.stderr);
+        assert!(why.contains("is not the state of an arm"), "{why}");
+        assert_eq!(fs::read(&file).expect("it is still there"), contents);
+    }
+}
+
+#[test]
+fn a_state_file_with_a_wrong_byte_still_starts() {
     let folder = folder();
     let arm = start(folder.path());
     arm.client().say("M550 Pfirst");
     arm.cut_power();
     let state = folder.path().join("state");
     let whole = fs::read(&state).expect("the state is there");
-    assert!(!whole.is_empty());
-    // Each byte wrong, and the file cut there.
-    for at in 0..whole.len() * 2 {
+    // Where the settings are, and here and there.
+    for at in (0..80).chain((80..whole.len()).step_by(4001)) {
         let mut torn = whole.clone();
-        match whole.len().checked_sub(at + 1) {
-            Some(end) => torn[end] ^= 0x55,
-            None => torn.truncate(at - whole.len()),
-        }
+        torn[at] ^= 0x55;
         fs::write(&state, &torn).expect("a file can be written");
         let reply = start(folder.path()).client().say("M550");
         assert!(
             reply == "ok MACHINENAME:first" || reply == "ok MACHINENAME:line-us",
-            "tear {at}: {reply:?}"
+            "byte {at}: {reply:?}"
         );
     }
 }

@@ -286,7 +286,7 @@ fn step<'a>(
         most: range.most.into(),
     };
     words
-        .fixed(letter, Coordinate::FRACTION_BITS, range.most.into())?
+        .fixed(letter, StepSize::FRACTION_BITS, range.most.into())?
         .ok()
         .and_then(|bits| range.step(bits))
         .ok_or(out_of_range)

@@ -132,10 +132,11 @@ impl Reply {
         self.compose(format_args!("ok S:{s} E:{e} P:{p}"));
     }
 
-    /// What the machine is.
-    pub fn capabilities(&mut self, name: &MachineName) {
+    /// What the machine is: a guest in somebody's network, or on its own.
+    pub fn capabilities(&mut self, name: &MachineName, own_network: bool) {
+        let mode = if own_network { "AP" } else { "ST" };
         self.compose(format_args!(
-            "ok CONNECTMODE:ST MACHINENAME:{}",
+            "ok CONNECTMODE:{mode} MACHINENAME:{}",
             name.as_str()
         ));
     }

@@ -294,3 +294,31 @@ fn pictures_see_what_the_pulses_say() {
     assert!((seen.x.to_f64() - 1400.0).abs() < 0.05 && (seen.y.to_f64() + 300.0).abs() < 0.05);
     assert!(seen.z.to_f64() < 0.01);
 }
+
+#[test]
+fn visitors_that_come_and_go_do_not_put_off_the_lift() {
+    let mut machine = arm();
+    machine.take(A, &line(1000, 1000, 0));
+    run(&mut machine, 0, 1000);
+    machine.client_gone(A);
+    for second in 1..5 {
+        run(&mut machine, second * 1000, second * 1000 + 990);
+        machine.client_gone(A);
+    }
+    assert!(!run(&mut machine, 5000, 7000).position.pen_is_down());
+}
+
+#[test]
+fn a_jump_of_the_calibration_shows_in_the_frames() {
+    let mut machine = arm();
+    machine.take(A, &line(1000, 1000, 0));
+    run(&mut machine, 0, 1000);
+    machine.set_calibration(machine.calibration_here());
+    run(&mut machine, 1010, 1100);
+    machine.take(A, &line(1000, 1000, 0));
+    run(&mut machine, 1110, 2000);
+    assert!(!run(&mut machine, 2010, 2010).moving);
+    // The pen was told 45 degrees, which without calibration is below the paper.
+    machine.set_calibration(Calibration::default());
+    assert!(run(&mut machine, 2020, 2020).moving);
+}

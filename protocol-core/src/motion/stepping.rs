@@ -8,17 +8,21 @@ use crate::arm::{Angles, PenLift, forward, inverse};
 /// (`reference/line-us.md`, section 4).
 pub const STEP_TIME: u32 = 10_000;
 
-/// The largest step of an interpolated move along any axis, in 1/65536 drawing units.
+/// The largest step of an interpolated move along any axis, in 1/2^24 drawing units: finer than
+/// coordinates, because a move has thousands of steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct StepSize(u32);
 
 impl StepSize {
+    /// Fraction bits of the representation.
+    pub const FRACTION_BITS: u32 = 24;
+
     /// A whole number of drawing units, at least 1.
     pub const fn from_units(units: u8) -> Self {
-        Self(if units == 0 { 1 } else { units as u32 } << Coordinate::FRACTION_BITS)
+        Self(if units == 0 { 1 } else { units as u32 } << Self::FRACTION_BITS)
     }
 
-    /// In 1/65536 units.
+    /// In 1/2^24 units.
     pub const fn bits(self) -> u32 {
         self.0
     }
@@ -42,7 +46,7 @@ impl StepRange {
         most: 100,
     };
 
-    /// A step size in 1/65536 units, `None` when it is not in the range.
+    /// A step size in 1/2^24 units, `None` when it is not in the range.
     pub fn step(self, bits: i64) -> Option<StepSize> {
         let range = i64::from(StepSize::from_units(self.least).0)
             ..=i64::from(StepSize::from_units(self.most).0);
@@ -163,16 +167,24 @@ impl Line {
 }
 
 /// `ceil(distance / size)`, of the numbers as they were typed: 3.6 units in steps of 1.2 are three steps,
-/// although neither is exact in 1/65536 units. Both ends may be half a unit in the last place off, and so
-/// may each step that is no whole number.
+/// although neither is exact in binary. Both ends may be half a unit in the last place off, and so may
+/// each step that is no whole number.
 fn step_count(distance: u32, size: StepSize) -> u32 {
-    let (whole, rest) = (distance / size.bits(), distance % size.bits());
-    if whole == 0 {
+    const FINER: u32 = StepSize::FRACTION_BITS - Coordinate::FRACTION_BITS;
+    let whole_units = size.bits().trailing_zeros() >= StepSize::FRACTION_BITS;
+    let (count, rest, lost) = if whole_units {
+        // In 32 bits, which the chip divides by itself.
+        let size = size.bits() >> FINER;
+        (distance / size, distance % size, 1)
+    } else {
+        let (distance, size) = (u64::from(distance) << FINER, u64::from(size.bits()));
+        let count = (distance / size) as u32;
+        (count, (distance % size) as u32, (1 << FINER) + count / 2)
+    };
+    if count == 0 {
         return u32::from(distance > 0);
     }
-    let exact = size.bits().trailing_zeros() >= Coordinate::FRACTION_BITS;
-    let lost = if exact { 1 } else { 1 + whole / 2 };
-    whole + u32::from(rest > lost)
+    count + u32::from(rest > lost)
 }
 
 const HALF: i64 = 1 << 31;
@@ -311,12 +323,21 @@ mod tests {
 
     #[test]
     fn steps_are_counted_in_numbers_as_typed() {
-        // 3.6 units and 1.2 units.
-        assert_eq!(step_count(235_930, StepSize(78_643)), 3);
-        assert_eq!(step_count(235_940, StepSize(78_643)), 4);
-        assert_eq!(step_count(1, StepSize(78_643)), 1);
-        // 500.0003 units and 5 units.
-        assert_eq!(step_count(32_768_020, StepSize::from_units(5)), 101);
+        let typed = |step: f64| StepSize((step * 16_777_216.0).round() as u32);
+        let units = |distance: f64| (distance * 65_536.0).round() as u32;
+        for (distance, step, count) in [
+            (3.6, 1.2, 3),
+            (3.6002, 1.2, 4),
+            (11.1, 3.7, 3),
+            (1999.81, 1.1, 1819),
+            (3200.0, 1.0, 3200),
+            (500.0003, 5.0, 101),
+            (500.0, 5.0, 100),
+            (0.00002, 1.2, 1),
+        ] {
+            let counted = step_count(units(distance), typed(step));
+            assert_eq!(counted, count, "{distance} units in steps of {step}");
+        }
     }
 
     #[test]
@@ -334,19 +355,19 @@ mod tests {
     #[test]
     fn step_sizes_have_their_ranges() {
         assert_eq!(
-            StepRange::PEN_DOWN.step(1 << 16),
+            StepRange::PEN_DOWN.step(1 << 24),
             Some(StepSize::from_units(1))
         );
         assert_eq!(
-            StepRange::PEN_DOWN.step(30 << 16),
+            StepRange::PEN_DOWN.step(30 << 24),
             Some(StepSize::from_units(30))
         );
-        assert_eq!(StepRange::PEN_DOWN.step((30 << 16) + 1), None);
+        assert_eq!(StepRange::PEN_DOWN.step((30 << 24) + 1), None);
         assert_eq!(
-            StepRange::PEN_UP.step(100 << 16),
+            StepRange::PEN_UP.step(100 << 24),
             Some(StepSize::from_units(100))
         );
-        assert_eq!(StepRange::PEN_UP.step((1 << 16) - 1), None);
+        assert_eq!(StepRange::PEN_UP.step((1 << 24) - 1), None);
     }
 
     #[test]
@@ -375,7 +396,7 @@ mod tests {
         fn ends_are_exact_and_no_step_is_too_long(from in inside(), to in inside(), down in 1u8..=30, up in 1u8..=100) {
             let sizes = sizes(down, up);
             let line = Line::new(from, to, sizes);
-            let size = sizes.between(from.z, to.z).bits();
+            let size = sizes.between(from.z, to.z).bits() >> 8;
             prop_assert_eq!(line.straight(0), from);
             prop_assert_eq!(line.straight(line.steps * STEP_TIME), to);
             for step in 0..line.steps {

@@ -15,6 +15,8 @@ pub struct Decimal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfRange;
 
+/// The largest power of ten in 64 bits.
+const LARGEST_POWER: u32 = 19;
 /// Digits kept; further ones are below anything the arm can resolve.
 const MAX_DIGITS: u32 = 18;
 /// Written exponents are cut off here: far beyond any limit, and nothing overflows.
@@ -83,8 +85,14 @@ impl Decimal {
         } else {
             match 10u64.checked_pow(self.exponent.unsigned_abs()) {
                 Some(power) => scale_down(self.mantissa, fraction_bits, power, limit)?,
-                // Less than 10^18 / 10^20: nothing at any resolution used here.
-                None => 0,
+                // Digits beyond the nineteenth place are nothing at any resolution used here.
+                None => {
+                    let beyond = self.exponent.unsigned_abs() - LARGEST_POWER;
+                    let mantissa = 10u64
+                        .checked_pow(beyond)
+                        .map_or(0, |power| self.mantissa / power);
+                    scale_down(mantissa, fraction_bits, 10u64.pow(LARGEST_POWER), limit)?
+                }
             }
         };
         let magnitude = i64::try_from(magnitude).map_err(|_| OutOfRange)?;
@@ -160,6 +168,8 @@ mod tests {
             ("1E+3", 1000.0),
             ("0.1e1", 1.0),
             ("0.30000000000000004", 0.3),
+            ("0.01234567890123456789", 0.012345678901234568),
+            ("0.010000000000000000000000000", 0.01),
             ("1000000", 1_000_000.0),
             ("0000000000000000000000012", 12.0),
             ("1e-400", 0.0),

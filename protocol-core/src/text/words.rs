@@ -233,7 +233,8 @@ fn any_number(value: &[u8], letter: char) -> Result<(Decimal, &[u8]), WordError<
     match (Decimal::read(inner), quoted) {
         (Some((number, [b'"', rest @ ..])), true) => return Ok((number, rest)),
         // `0x10` would otherwise read as zero and a parameter X.
-        (Some((_, [b'x' | b'X', ..])), _) if inner.first() == Some(&b'0') => {}
+        (Some((_, [b'x' | b'X', ..])), _)
+            if matches!(inner, [b'0', ..] | [b'+' | b'-', b'0', ..]) => {}
         (Some((number, rest)), false) if ends_number(rest) => return Ok((number, rest)),
         _ => {}
     }
@@ -416,7 +417,8 @@ mod tests {
     #[test]
     fn numbers_that_are_none() {
         for value in [
-            "nan", "inf", "-inf", "0x10", "0X1F", "1.2.3", "--1", "1-", "\"x\"", "1,5", "\u{b2}",
+            "nan", "inf", "-inf", "0x10", "0X1F", "-0x10", "+0x5", "1.2.3", "--1", "1-", "\"x\"",
+            "1,5", "\u{b2}",
         ] {
             assert_eq!(
                 Words::new(value.as_bytes()).number('X'),

@@ -46,6 +46,9 @@ pub struct Script {
 /// When it cannot be read.
 pub fn open(path: &Path, bar: ProgressBar) -> io::Result<(Script, Rc<RefCell<Outcome>>)> {
     let file = File::open(path)?;
+    if file.metadata()?.is_dir() {
+        return Err(io::Error::other("is a folder"));
+    }
     bar.set_length(file.metadata()?.len());
     let outcome = Rc::new(RefCell::new(Outcome::default()));
     let script = Script {

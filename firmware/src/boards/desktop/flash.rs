@@ -53,17 +53,26 @@ impl FileFlash {
     /// Opens the flash in a file, which is made if it does not exist.
     ///
     /// # Errors
-    /// When the file cannot be read and written.
+    /// When the file cannot be read and written, or is of another size than this flash: then it is
+    /// something else, and stays as it is.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)?;
+        if !path.exists() {
+            // Whole or not at all.
+            let folder = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
+            let mut new = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))?;
+            new.write_all(&vec![0xff; SIZE as usize])?;
+            new.persist(path).map_err(|error| error.error)?;
+        }
+        let file = OpenOptions::new().read(true).write(true).open(path)?;
+        if file.metadata()?.len() != u64::from(SIZE) {
+            return Err(io::Error::other(
+                "is not the state of an arm, and stays as it is",
+            ));
+        }
         let mut contents = Vec::new();
         (&file).take(SIZE.into()).read_to_end(&mut contents)?;
-        contents.resize(SIZE as usize, 0xff);
         Ok(Self {
             contents,
             file: Some(file),

@@ -9,7 +9,9 @@ pub mod net;
 pub mod recorder;
 
 use crate::board::{Address, Vitals};
+use crate::boards::scripted_radio::OnAir;
 use protocol_core::lineus::Identity;
+use protocol_core::wifi::{Network, Ssid};
 
 /// A made-up address of the kind that no maker has.
 pub const IDENTITY: Identity = Identity {
@@ -22,6 +24,25 @@ pub const VITALS: Vitals = Vitals {
     reset_reason: "program start",
     last_panic: "",
 };
+
+/// The network that a desktop is in, whatever it is: as if it were an open one.
+pub const OWN_NETWORK: OnAir = OnAir {
+    ssid: "this computer's",
+    password: None,
+    signal_dbm: -30,
+};
+
+/// The same to join.
+///
+/// # Panics
+/// Never: the name is short enough.
+#[expect(clippy::expect_used, reason = "a constant of one to 32 bytes")]
+pub fn own_network() -> Network {
+    Network {
+        ssid: Ssid::new(OWN_NETWORK.ssid.as_bytes()).expect("one to 32 bytes"),
+        password: None,
+    }
+}
 
 /// Addresses are the operating system's business.
 pub struct NoAddress;

@@ -14,10 +14,6 @@ const KEEP_ALIVE: TcpKeepalive = TcpKeepalive::new()
     .with_interval(Duration::from_secs(5))
     .with_retries(3);
 
-/// A reply that nobody confirms for so long ends the connection.
-#[cfg(target_os = "linux")]
-const UNHEARD: Duration = Duration::from_secs(25);
-
 /// Listens on one address.
 pub struct Listener(TcpAcceptor);
 
@@ -40,9 +36,6 @@ impl TcpAccept for Listener {
         let options = SockRef::from(socket.get_ref());
         options.set_tcp_nodelay(true)?;
         options.set_tcp_keepalive(&KEEP_ALIVE)?;
-        // Linux sends no probes while a reply is on its way, and would try for a quarter of an hour.
-        #[cfg(target_os = "linux")]
-        options.set_tcp_user_timeout(Some(UNHEARD))?;
         Ok((peer, socket))
     }
 }

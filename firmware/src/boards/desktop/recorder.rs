@@ -134,6 +134,8 @@ struct Recording {
     last_moving: Micros,
     unsaved: bool,
     saved: Instant,
+    /// That files cannot be written has been told.
+    told: bool,
 }
 
 impl Recording {
@@ -163,6 +165,7 @@ impl Recording {
             last_moving: Micros::default(),
             unsaved: false,
             saved: Instant::now(),
+            told: false,
         })
     }
 
@@ -173,15 +176,28 @@ impl Recording {
                 let frame = time - previous.unwrap_or(time);
                 self.totals.moving += Duration::from_micros(frame.get());
             }
-            if set_point.moving || previous.is_none() {
-                self.moving(time, &set_point)?;
+            let written = if set_point.moving || previous.is_none() {
+                self.moving(time, &set_point)
             } else {
-                self.resting(time, set_point)?;
-            }
+                self.resting(time, set_point)
+            };
+            self.note(written);
             previous = Some(time);
         }
         self.save()?;
         Ok(self.totals)
+    }
+
+    /// The arm draws on without a file; it is tried again when it rests, and told once.
+    fn note(&mut self, written: io::Result<()>) {
+        match written {
+            Ok(()) => {}
+            Err(error) if self.told => drop(error),
+            Err(error) => {
+                log::error!("the picture or the trace cannot be written: {error}");
+                self.told = true;
+            }
+        }
     }
 
     fn moving(&mut self, time: Micros, set_point: &SetPoint) -> io::Result<()> {
@@ -251,6 +267,7 @@ impl Recording {
     }
 
     fn save(&mut self) -> io::Result<()> {
+        self.saved = Instant::now();
         if let Some(trace) = &mut self.trace {
             trace.flush()?;
         }
@@ -259,7 +276,7 @@ impl Recording {
             canvas.save(path)?;
         }
         self.unsaved = false;
-        self.saved = Instant::now();
+        self.told = false;
         Ok(())
     }
 }
