@@ -11,7 +11,7 @@
 use crate::arm::{Angles, Calibration, HOME_ANGLES, PenLift, Pulses, ServoRange, forward, inverse};
 use crate::motion::{
     Coordinate, DEFAULT_STEPS, HOME, Line, Microdegrees, Micros, PEN_DOWN, PEN_UP, Position, Rapid,
-    Steps, WideCoordinate, closest, contains,
+    Steps, WideCoordinate, closest, hold,
 };
 use heapless::Deque;
 
@@ -326,12 +326,8 @@ impl Machine {
                 // A move takes less than 2^32 us.
                 let elapsed = (now - active.begun).get() as u32;
                 let (position, held) = active.motion.at(elapsed);
-                if contains(position.x, position.y) {
-                    (position, held)
-                } else {
-                    let (x, y) = closest(position.x.into(), position.y.into());
-                    (Position { x, y, ..position }, true)
-                }
+                let (position, outside) = hold(position);
+                (position, held || outside)
             }
             None => {
                 self.clock = now;
@@ -411,8 +407,7 @@ impl Machine {
         } else {
             forward(model, self.data.lift)
         };
-        let (x, y) = closest(position.x.into(), position.y.into());
-        self.position = Position { x, y, ..position };
+        (self.position, _) = hold(position);
         self.active = None;
     }
 

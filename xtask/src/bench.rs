@@ -49,9 +49,6 @@ impl Row {
     }
 }
 
-/// The command that is parsed, answered and echoed everywhere.
-pub const COMMAND: &str = "G01 X1234 Y-567 Z1000";
-
 /// Measures everything, in one run.
 pub fn measure(setup: bool) -> Result<Vec<Row>> {
     let programs = run_bench(&Board::Virt.build("bench", &["bench"], setup)?)?;

@@ -97,7 +97,7 @@ impl Board {
 
     fn cargo(self, verb: &str, extra_features: &[&str], setup: bool) -> Result<Command> {
         let mut cargo = match self.target() {
-            None => Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into())),
+            None => own_cargo(),
             Some(target) => Toolchain::find(target, setup)?.cargo(target),
         };
         let mut features = vec![self.name()];
@@ -112,6 +112,11 @@ impl Board {
         }
         Ok(cargo)
     }
+}
+
+/// The cargo that started this program.
+pub fn own_cargo() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()))
 }
 
 /// The project's folder.

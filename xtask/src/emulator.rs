@@ -177,11 +177,6 @@ impl Emulator {
             std::thread::sleep(Duration::from_millis(10));
         }
     }
-
-    /// The folder of its sockets and recordings, gone with it.
-    pub fn folder(&self) -> &Path {
-        self.folder.path()
-    }
 }
 
 impl Drop for Emulator {

@@ -2,8 +2,7 @@
 
 use anyhow::{Result, bail};
 use std::path::PathBuf;
-use std::process::Command;
-use xtask::board::{Board, root, run, target_dir};
+use xtask::board::{Board, own_cargo, root, run, target_dir};
 
 /// Builds the firmware and makes the file.
 pub fn image(board: Board, setup: bool) -> Result<PathBuf> {
@@ -14,8 +13,7 @@ pub fn image(board: Board, setup: bool) -> Result<PathBuf> {
     let version = env!("CARGO_PKG_VERSION");
     let file = target_dir().join(format!("quill-{version}-{}.bin", board.name()));
     // A program of its own, because espflash's library takes longer to build than all other commands.
-    let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
-    let mut tool = Command::new(cargo);
+    let mut tool = own_cargo();
     tool.current_dir(root())
         .args(["run", "--quiet", "--package", "image", "--", board.name()])
         .arg(firmware)

@@ -4,7 +4,7 @@ use anyhow::Result;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
-use xtask::board::{Board, root, run};
+use xtask::board::{Board, own_cargo, root, run};
 use xtask::emulator::QEMU;
 use xtask::toolchain::require;
 
@@ -111,7 +111,7 @@ fn step(name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {
 }
 
 fn cargo() -> Command {
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
+    let mut cargo = own_cargo();
     cargo.current_dir(root() as &Path);
     cargo
 }

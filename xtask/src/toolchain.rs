@@ -1,7 +1,7 @@
 //! A compiler for the chips: rustup's target where it is installed, else the distribution's compiler
 //! with its library sources, else word of what to install.
 
-use crate::board::run;
+use crate::board::{own_cargo, run};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -68,7 +68,7 @@ impl Toolchain {
     /// Its cargo, ready for arguments; the verb must come first.
     pub fn cargo(&self, target: &str) -> Command {
         match self {
-            Self::Rustup => Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into())),
+            Self::Rustup => own_cargo(),
             Self::Espressif => {
                 let mut cargo = Command::new("cargo");
                 cargo

@@ -2,7 +2,6 @@
 #![no_std]
 #![no_main]
 
-use core::net::{Ipv4Addr, SocketAddr};
 use edge_nal::{TcpAccept, TcpBind};
 use embassy_executor::Spawner;
 use embassy_net::{Config, Runner, StackResources};
@@ -11,6 +10,7 @@ use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
 use firmware::boards::virt::net::VirtNet;
 use firmware::boards::virt::world::{Lines, Recorder};
 use firmware::boards::virt::{self, executor};
+use firmware::services::line_us::ANYWHERE;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// As many as the firmware has: the stack looks through all of them at each packet.
@@ -58,10 +58,7 @@ async fn boot(spawner: Spawner, card: VirtNet) {
 
 #[embassy_executor::task(pool_size = CONNECTIONS)]
 async fn echo(tcp: Connections) {
-    let Ok(acceptor) = tcp
-        .bind(SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), 1337))
-        .await
-    else {
+    let Ok(acceptor) = tcp.bind(ANYWHERE).await else {
         return;
     };
     loop {

@@ -3,7 +3,6 @@
 #![no_main]
 
 use core::future::pending;
-use core::net::{Ipv4Addr, SocketAddr};
 use edge_nal::TcpBind;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Ticker};
@@ -18,7 +17,7 @@ use firmware::boards::esp::start::{self, Network, Parts};
 use firmware::boards::esp::system::Watchdog;
 use firmware::boards::esp::{Button, last_panic, pwm_timer, system};
 use firmware::services::House;
-use firmware::services::line_us::{PORT, Server};
+use firmware::services::line_us::{ANYWHERE, Server};
 use firmware::services::panel::Lamp;
 use firmware::services::storage::Memory;
 use protocol_core::machine::{Client, MAX_CLIENTS};
@@ -86,20 +85,16 @@ fn spawn(
 
 static SERVER: Server = Server::new();
 
-fn here() -> SocketAddr {
-    SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), PORT)
-}
-
 #[embassy_executor::task(pool_size = MAX_CLIENTS)]
 async fn worker(tcp: Connections, client: Client, house: &'static House) {
-    if let Ok(acceptor) = tcp.bind(here()).await {
+    if let Ok(acceptor) = tcp.bind(ANYWHERE).await {
         SERVER.work(&acceptor, client, house).await;
     }
 }
 
 #[embassy_executor::task]
 async fn doorman(tcp: Connections) {
-    if let Ok(acceptor) = tcp.bind(here()).await {
+    if let Ok(acceptor) = tcp.bind(ANYWHERE).await {
         SERVER.turn_away(&acceptor).await;
     }
 }

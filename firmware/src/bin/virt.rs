@@ -2,7 +2,6 @@
 #![no_std]
 #![no_main]
 
-use core::net::{Ipv4Addr, SocketAddr};
 use edge_nal::TcpBind;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_futures::select::{Either, select};
@@ -22,7 +21,7 @@ use firmware::boards::virt::world::{Lines, Recorder};
 use firmware::boards::virt::{self, Wired, executor};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
-use firmware::services::line_us::{PORT, Server};
+use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::storage::Memory;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
@@ -128,20 +127,16 @@ fn start(
 
 static SERVER: Server = Server::new();
 
-fn here() -> SocketAddr {
-    SocketAddr::new(Ipv4Addr::UNSPECIFIED.into(), PORT)
-}
-
 #[embassy_executor::task(pool_size = MAX_CLIENTS)]
 async fn worker(tcp: Connections, client: Client, house: &'static House) {
-    if let Ok(acceptor) = tcp.bind(here()).await {
+    if let Ok(acceptor) = tcp.bind(ANYWHERE).await {
         SERVER.work(&acceptor, client, house).await;
     }
 }
 
 #[embassy_executor::task]
 async fn doorman(tcp: Connections) {
-    if let Ok(acceptor) = tcp.bind(here()).await {
+    if let Ok(acceptor) = tcp.bind(ANYWHERE).await {
         SERVER.turn_away(&acceptor).await;
     }
 }

@@ -6,6 +6,7 @@
 use super::House;
 use crate::log::info;
 use core::fmt::Display;
+use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use core::sync::atomic::{AtomicU8, Ordering};
 use edge_nal::{Close, TcpAccept, TcpShutdown};
 use embassy_futures::select::{Either, select};
@@ -22,6 +23,8 @@ use protocol_core::wifi::Network;
 
 /// The port of Line-us.
 pub const PORT: u16 = 1337;
+/// The port, at every address that the machine has.
+pub const ANYWHERE: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::UNSPECIFIED), PORT);
 /// Bytes taken from a socket at a time.
 const CHUNK: usize = 512;
 /// How long a reply may wait for a client that does not read. After that the reply is lost, and so are
@@ -119,11 +122,7 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     while let Ok(length @ 1..) = answers.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
-            match &request {
-                // The busiest one, without a detour.
-                Request::Errand(errand) => reply.report(&house.arm.errand(client, errand).await),
-                _ => perform(request, &mut reply, client, house).await,
-            }
+            perform(&request, &mut reply, client, house).await;
             answers.send(&reply).await;
         }
         // A client that sends faster than it is served would else keep everybody waiting.
@@ -135,11 +134,11 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
 }
 
 /// Does what a line asks for, and puts the answer into `reply`.
-async fn perform(request: Request, reply: &mut Reply, client: Client, house: &House) {
+async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &House) {
     let arm = &house.arm;
     match request {
         Request::Answered => {}
-        Request::Errand(errand) => reply.report(&arm.errand(client, &errand).await),
+        Request::Errand(errand) => reply.report(&arm.errand(client, errand).await),
         Request::SetSpeed { pen_down, pen_up } => {
             arm.with(|machine| {
                 let now = machine.steps();
@@ -178,24 +177,24 @@ fn diagnose(reply: &mut Reply, house: &House) {
     });
 }
 
-async fn rename(name: MachineName, reply: &mut Reply, client: Client, house: &House) {
+async fn rename(name: &MachineName, reply: &mut Reply, client: Client, house: &House) {
     let _rest = house.arm.rest(client).await;
     match house.store.save(Setting::Name(name.clone())).await {
         Ok(()) => {
-            reply.name(&name);
-            house.rename(name);
+            reply.name(name);
+            house.rename(name.clone());
         }
         Err(error) => refuse_store("name", &error, reply),
     }
 }
 
 /// The reply says that the network is remembered; joining it may well end this connection.
-async fn join(network: Network, reply: &mut Reply, client: Client, house: &House) {
+async fn join(network: &Network, reply: &mut Reply, client: Client, house: &House) {
     let _rest = house.arm.rest(client).await;
     match house.store.save(Setting::Network(network.clone())).await {
         Ok(()) => {
             reply.ok();
-            house.wifi.change(network);
+            house.wifi.change(network.clone());
         }
         Err(error) => refuse_store("network", &error, reply),
     }

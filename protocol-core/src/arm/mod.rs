@@ -5,7 +5,7 @@ mod servos;
 mod tables;
 
 pub use kinematics::{Angles, HOME_ANGLES, PenLift, forward, inverse};
-pub use servos::{Calibration, Pulses, Servo, ServoRange};
+pub use servos::{Calibration, Pulses, ServoRange};
 
 pub(crate) use kinematics::{LINK, square_of};
 pub(crate) use tables::high_half;

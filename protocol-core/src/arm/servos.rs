@@ -4,22 +4,6 @@ use super::kinematics::Angles;
 use super::tables::high_half;
 use crate::motion::{Microdegrees, PulseWidth};
 
-/// One of the arm's servos, in the order of every array here.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Servo {
-    /// Carries the upper link.
-    Shoulder = 0,
-    /// Sets the forearm's direction.
-    Elbow = 1,
-    /// Lifts the pen.
-    Pen = 2,
-}
-
-impl Servo {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Shoulder, Self::Elbow, Self::Pen];
-}
-
 /// Set-points of the three servos: shoulder, elbow, pen.
 pub type Pulses = [PulseWidth; 3];
 

@@ -154,7 +154,7 @@ impl Reply {
         self.compose(format_args!(
             "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
-             FreeHeap:{} ResetReason:\"{}\"",
+             FreeHeap:{} ResetReason:\"{}\"{}",
             state.name.as_str(),
             state.identity.serial(),
             Uptime(state.uptime),
@@ -163,17 +163,8 @@ impl Reply {
             z.rounded(),
             state.free_memory,
             state.reset_reason,
+            LastPanic(state.last_panic),
         ));
-        if !state.last_panic.is_empty() {
-            self.text.truncate(self.text.len() - TERMINATOR.len());
-            // Two texts of this length fit the message beside everything else.
-            let _ = write!(
-                self.text,
-                " LastPanic:\"{}\"",
-                excerpt(state.last_panic, MAX_PANIC)
-            );
-            self.push(TERMINATOR);
-        }
     }
 
     fn place(&mut self, position: Position, info: Option<&str>) {
@@ -256,6 +247,18 @@ impl fmt::Display for Degrees {
         let sign = if hundredths < 0 { "-" } else { "" };
         let magnitude = hundredths.unsigned_abs();
         write!(out, "{sign}{}.{:02}", magnitude / 100, magnitude % 100)
+    }
+}
+
+/// A token of its own, or nothing where nothing has panicked.
+struct LastPanic<'a>(&'a str);
+
+impl fmt::Display for LastPanic<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        write!(out, " LastPanic:\"{}\"", excerpt(self.0, MAX_PANIC))
     }
 }
 

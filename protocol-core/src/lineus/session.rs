@@ -70,56 +70,57 @@ impl Session {
     /// in `reply`.
     pub fn next_request(&mut self, input: &mut &[u8], reply: &mut Reply) -> Option<Request> {
         let line = self.lines.next_line(input)?;
-        let command = line.map_err(Refusal::from).and_then(parse);
-        // The busiest one first, and without moving it about: commands are large.
-        if let Ok(Command::Move(manner, axes)) = &command {
-            let [x, y, z] = axes.to_array();
-            let target = Target {
-                x: x.map(|x| self.transform.x(x)),
-                y: y.map(|y| self.transform.y(y)),
-                z: z.map(WideCoordinate::from_bits),
-            };
-            return Some(Request::Errand(Errand::Move(*manner, target)));
-        }
-        match command {
-            Ok(command) => Some(self.request(command, reply)),
+        Some(match line.map_err(Refusal::from).and_then(parse) {
+            // By reference: commands are large, and copying one costs as much as reading it.
+            Ok(command) => request(&mut self.transform, &command, reply),
             Err(refusal) => {
                 reply.refuse(&refusal);
-                Some(Request::Answered)
+                Request::Answered
             }
-        }
+        })
     }
+}
 
-    #[inline(never)]
-    fn request(&mut self, command: Command, reply: &mut Reply) -> Request {
-        match command {
-            Command::Transform { x, y, scale } => {
-                match self.transform.with(x, y, scale) {
-                    Some(transform) => {
-                        self.transform = transform;
-                        reply.ok();
-                    }
-                    None => reply.refuse(&Refusal::ZeroScale),
-                }
-                Request::Answered
-            }
-            // A move was dealt with before.
-            Command::Nothing | Command::Move(..) => {
-                reply.ok();
-                Request::Answered
-            }
-            Command::Home => Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
-            Command::Speed { pen_down, pen_up } => Request::SetSpeed { pen_down, pen_up },
-            Command::Position => Request::Position,
-            Command::Angles => Request::Angles,
-            Command::Capabilities => Request::Capabilities,
-            Command::Diagnostics => Request::Diagnostics,
-            Command::Calibrate => Request::Calibrate,
-            Command::ClearCalibration => Request::ClearCalibration,
-            Command::Name => Request::Name,
-            Command::Rename(name) => Request::Rename(name),
-            Command::Join(network) => Request::Join(network),
+#[inline]
+fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Reply) -> Request {
+    match command {
+        Command::Move(manner, axes) => {
+            let [x, y, z] = axes.to_array();
+            let target = Target {
+                x: x.map(|x| scale_and_origin.x(x)),
+                y: y.map(|y| scale_and_origin.y(y)),
+                z: z.map(WideCoordinate::from_bits),
+            };
+            Request::Errand(Errand::Move(*manner, target))
         }
+        Command::Transform { x, y, scale } => {
+            match scale_and_origin.with(*x, *y, *scale) {
+                Some(transform) => {
+                    *scale_and_origin = transform;
+                    reply.ok();
+                }
+                None => reply.refuse(&Refusal::ZeroScale),
+            }
+            Request::Answered
+        }
+        Command::Nothing => {
+            reply.ok();
+            Request::Answered
+        }
+        Command::Home => Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
+        Command::Speed { pen_down, pen_up } => Request::SetSpeed {
+            pen_down: *pen_down,
+            pen_up: *pen_up,
+        },
+        Command::Position => Request::Position,
+        Command::Angles => Request::Angles,
+        Command::Capabilities => Request::Capabilities,
+        Command::Diagnostics => Request::Diagnostics,
+        Command::Calibrate => Request::Calibrate,
+        Command::ClearCalibration => Request::ClearCalibration,
+        Command::Name => Request::Name,
+        Command::Rename(name) => Request::Rename(name.clone()),
+        Command::Join(network) => Request::Join(network.clone()),
     }
 }
 

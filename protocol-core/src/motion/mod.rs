@@ -13,4 +13,4 @@ pub use units::{
     WideCoordinate,
 };
 
-pub(crate) use stepping::{Line, Rapid};
+pub(crate) use stepping::{Line, Rapid, hold};

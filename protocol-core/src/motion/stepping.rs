@@ -194,6 +194,7 @@ fn rate(distance: i32, duration: i64) -> i64 {
 }
 
 /// The position itself, or the closest point of the drawing area and `true`.
+#[inline]
 pub(crate) fn hold(position: Position) -> (Position, bool) {
     if contains(position.x, position.y) {
         return (position, false);

@@ -87,10 +87,7 @@ impl<'a> Words<'a> {
     /// [`WordError::NoCode`] with what is there instead.
     #[inline(always)]
     pub fn code(&mut self) -> Result<Option<(u8, u32)>, WordError<'a>> {
-        let mut start = skip_blanks(self.rest);
-        while let [b'\t' | b';' | b'(', ..] = start {
-            start = after_comments(start)?;
-        }
+        let start = first_word(self.rest)?;
         if start.is_empty() {
             return Ok(None);
         }
@@ -104,20 +101,13 @@ impl<'a> Words<'a> {
                 return Ok(Some((letter, number)));
             }
         }
-        Err(token(start).map_or(WordError::NotUtf8, WordError::NoCode))
+        Err(no_code(start))
     }
 
     /// The code of the line, of which nobody knows what it means.
     #[cold]
     pub fn unknown(self) -> WordError<'a> {
-        let mut start = skip_blanks(self.rest);
-        while let [b'\t' | b';' | b'(', ..] = start {
-            match after_comments(start) {
-                Ok(after) => start = after,
-                Err(error) => return error,
-            }
-        }
-        token(start).map_or(WordError::NotUtf8, WordError::NoCode)
+        first_word(self.rest).map_or_else(|error| error, no_code)
     }
 
     /// The next parameter's letter in upper case, `None` at the end of the line.
@@ -162,9 +152,7 @@ impl<'a> Words<'a> {
         let (number, length, rest) = short_number(digits);
         let short = (1..=MAX_SHORT_DIGITS).contains(&length) && matches!(rest, [] | [b' ', ..]);
         if !short || number > limit {
-            let (number, rest) = any_number(self.rest, letter)?;
-            self.rest = rest;
-            return Ok(number.to_fixed(bits, limit));
+            return Ok(self.number(letter)?.to_fixed(bits, limit));
         }
         self.rest = rest;
         let magnitude = i64::from(number) << bits;
@@ -210,6 +198,21 @@ fn skip_blanks(mut rest: &[u8]) -> &[u8] {
         rest = after;
     }
     rest
+}
+
+/// What comes after blanks and comments at the start of a line.
+#[inline(always)]
+fn first_word(line: &[u8]) -> Result<&[u8], WordError<'_>> {
+    let mut start = skip_blanks(line);
+    while let [b'\t' | b';' | b'(', ..] = start {
+        start = after_comments(start)?;
+    }
+    Ok(start)
+}
+
+#[cold]
+fn no_code(start: &[u8]) -> WordError<'_> {
+    token(start).map_or(WordError::NotUtf8, WordError::NoCode)
 }
 
 /// The letter in upper case, `None` for any other byte.

@@ -5,10 +5,10 @@ use static_cell::ConstStaticCell;
 use virtio_drivers::transport::Transport as _;
 
 use super::{
-    console_queue::{Features, Queue, RECEIVE, used},
+    console_queue::{Port, RECEIVE},
     on_line,
 };
-use crate::boards::virt::virtio::{Device, Slot, Transport};
+use crate::boards::virt::virtio::Device;
 
 /// Bytes received at a time.
 const BATCH: usize = 64;
@@ -18,11 +18,7 @@ const LINE: usize = 32;
 static BUFFER: ConstStaticCell<[u8; BATCH]> = ConstStaticCell::new([0; _]);
 
 /// The console that brings lines in.
-pub struct Lines {
-    slot: Slot,
-    transport: Transport,
-    queue: Queue,
-}
+pub struct Lines(Port);
 
 impl Lines {
     /// Takes the device.
@@ -30,19 +26,7 @@ impl Lines {
     /// # Panics
     /// When the device refuses.
     pub fn new(device: Device) -> Self {
-        let Device {
-            slot,
-            mut transport,
-        } = device;
-        transport.begin_init(Features::VERSION_1);
-        let queue = Queue::new(&mut transport, RECEIVE, false, false).expect("virtio-console");
-        transport.finish_init();
-        slot.enable_interrupt();
-        Self {
-            slot,
-            transport,
-            queue,
-        }
+        Self(Port::new(device, RECEIVE))
     }
 
     /// Takes lines for ever.
@@ -50,22 +34,19 @@ impl Lines {
     /// # Panics
     /// When called twice.
     pub async fn run(self) -> ! {
-        let Self {
-            slot,
-            mut transport,
-            mut queue,
-        } = self;
+        let Self(mut port) = self;
         let buffer = BUFFER.take();
         let mut line = heapless::Vec::<u8, LINE>::new();
         loop {
             // SAFETY: the buffer lives for ever, and nothing touches it until it is popped; were this future dropped, it would
             // stay taken.
-            let token = unsafe { queue.add(&[], &mut [buffer]) }.expect("one buffer at a time");
-            transport.notify(RECEIVE);
-            used(slot, &queue).await;
+            let token =
+                unsafe { port.queue.add(&[], &mut [buffer]) }.expect("one buffer at a time");
+            port.transport.notify(RECEIVE);
+            port.used().await;
             // SAFETY: the very buffer that was added.
-            let received =
-                unsafe { queue.pop_used(token, &[], &mut [buffer]) }.expect("only one was added");
+            let received = unsafe { port.queue.pop_used(token, &[], &mut [buffer]) }
+                .expect("only one was added");
             for &byte in &buffer[..(received as usize).min(BATCH)] {
                 if byte == b'\n' {
                     on_line(&line);

@@ -9,10 +9,10 @@ use static_cell::ConstStaticCell;
 use virtio_drivers::transport::Transport as _;
 
 use super::{
-    console_queue::{Features, Queue, TRANSMIT, used},
+    console_queue::{Port, TRANSMIT},
     record,
 };
-use crate::boards::virt::virtio::{Device, Slot, Transport};
+use crate::boards::virt::virtio::Device;
 
 /// Bytes sent at a time.
 const BATCH: usize = 4096;
@@ -20,11 +20,7 @@ const BATCH: usize = 4096;
 static BUFFER: ConstStaticCell<[u8; BATCH]> = ConstStaticCell::new([0; _]);
 
 /// The console that carries records out.
-pub struct Recorder {
-    slot: Slot,
-    transport: Transport,
-    queue: Queue,
-}
+pub struct Recorder(Port);
 
 impl Recorder {
     /// Takes the device.
@@ -32,19 +28,7 @@ impl Recorder {
     /// # Panics
     /// When the device refuses.
     pub fn new(device: Device) -> Self {
-        let Device {
-            slot,
-            mut transport,
-        } = device;
-        transport.begin_init(Features::VERSION_1);
-        let queue = Queue::new(&mut transport, TRANSMIT, false, false).expect("virtio-console");
-        transport.finish_init();
-        slot.enable_interrupt();
-        Self {
-            slot,
-            transport,
-            queue,
-        }
+        Self(Port::new(device, TRANSMIT))
     }
 
     /// Carries records for ever.
@@ -52,22 +36,18 @@ impl Recorder {
     /// # Panics
     /// When called twice.
     pub async fn run(self) -> ! {
-        let Self {
-            slot,
-            mut transport,
-            mut queue,
-        } = self;
+        let Self(mut port) = self;
         let buffer = BUFFER.take();
         loop {
             let length = record::next_batch(buffer).await;
             // SAFETY: the buffer lives for ever, and nothing touches it until it is popped; were this future dropped, it would
             // stay taken.
-            let token =
-                unsafe { queue.add(&[&buffer[..length]], &mut []) }.expect("one buffer at a time");
-            transport.notify(TRANSMIT);
-            used(slot, &queue).await;
+            let token = unsafe { port.queue.add(&[&buffer[..length]], &mut []) }
+                .expect("one buffer at a time");
+            port.transport.notify(TRANSMIT);
+            port.used().await;
             // SAFETY: the very bytes that were added.
-            unsafe { queue.pop_used(token, &[&buffer[..length]], &mut []) }
+            unsafe { port.queue.pop_used(token, &[&buffer[..length]], &mut []) }
                 .expect("only one was added");
         }
     }
