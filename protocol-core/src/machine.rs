@@ -18,12 +18,20 @@ use heapless::Deque;
 /// Clients that may be connected at once; the next one is told so and closed.
 pub const MAX_CLIENTS: usize = 4;
 
-/// One of the connected clients.
+/// Everybody who may ask something of the arm: network clients, the serial port, the firmware itself.
+pub const MAX_ASKERS: usize = MAX_CLIENTS + 2;
+
+/// One of those who may ask something of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Client(u8);
 
 impl Client {
-    /// The client in a slot, `None` beyond [`MAX_CLIENTS`].
+    /// The serial port.
+    pub const SERIAL: Self = Self(MAX_CLIENTS as u8);
+    /// The firmware itself: waves, and settings that nobody on a connection asked to store.
+    pub const HOUSE: Self = Self(MAX_CLIENTS as u8 + 1);
+
+    /// The network client in a slot, `None` beyond [`MAX_CLIENTS`].
     pub const fn new(slot: u8) -> Option<Self> {
         if (slot as usize) < MAX_CLIENTS {
             Some(Self(slot))
@@ -32,7 +40,7 @@ impl Client {
         }
     }
 
-    /// Its slot, below [`MAX_CLIENTS`].
+    /// Its slot, below [`MAX_ASKERS`].
     pub const fn slot(self) -> usize {
         self.0 as usize
     }
@@ -206,8 +214,8 @@ pub struct Machine {
     /// Until when everything that happened is in the fields above.
     clock: Micros,
     active: Option<Active>,
-    waiting: Deque<(Client, Errand), MAX_CLIENTS>,
-    reports: Deque<(Client, Report), MAX_CLIENTS>,
+    waiting: Deque<(Client, Errand), MAX_ASKERS>,
+    reports: Deque<(Client, Report), MAX_ASKERS>,
     /// Who keeps the arm at rest.
     resting_for: Option<Client>,
     last_mover: Option<Client>,

@@ -10,13 +10,13 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
-use protocol_core::machine::{Client, Errand, MAX_CLIENTS, Machine, Report};
+use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report};
 use protocol_core::motion::Micros;
 
 /// The arm as its clients see it.
 pub struct Arm {
     machine: Mutex<CriticalSectionRawMutex, RefCell<Machine>>,
-    reports: [Signal<CriticalSectionRawMutex, Report>; MAX_CLIENTS],
+    reports: [Signal<CriticalSectionRawMutex, Report>; MAX_ASKERS],
 }
 
 impl Arm {
@@ -35,7 +35,7 @@ impl Arm {
 
     /// Has an errand done and gives its report: at once from rest, else when its turn has come.
     pub async fn errand(&self, client: Client, errand: &Errand) -> Report {
-        // Slots are below MAX_CLIENTS by the type's own rule.
+        // Slots are below MAX_ASKERS by the type's own rule.
         let Some(signal) = self.reports.get(client.slot()) else {
             return Report::Resting;
         };
