@@ -1,7 +1,7 @@
 //! What the arm remembers, and its form in memory.
 
 use crate::arm::Calibration;
-use crate::wifi::{MAX_NETWORK, Network};
+use crate::wifi::{MAX_NETWORK, Network, Networks};
 use heapless::String;
 
 /// Longest machine name, in bytes.
@@ -38,15 +38,60 @@ impl Default for MachineName {
     }
 }
 
+/// What the machine is after power-on, and what a long press of its button does
+/// (`reference/line-us.md`, section 5, M552).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartMode {
+    /// `S1`: a station; a long press changes to setup.
+    #[default]
+    Station,
+    /// `S2`: its own network; a long press changes to station.
+    AccessPoint,
+    /// `S3`: its own network, and the button does not change that.
+    AccessPointLocked,
+    /// `S4`: a station; only a press of 7 s changes to setup.
+    StationLongPress,
+}
+
+/// How the machine's own network is called (`reference/line-us.md`, section 5, M552).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AccessPointName {
+    /// `P1`: `Line-us-Setup`.
+    #[default]
+    Setup,
+    /// `P2`: as the machine.
+    Machine,
+}
+
 /// Everything that is kept across restarts.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// The machine's name.
+    /// The machine's name (M550).
     pub name: MachineName,
-    /// The servos' offsets.
+    /// The servos' offsets (M374).
     pub calibration: Calibration,
-    /// The network to join.
-    pub network: Option<Network>,
+    /// The networks to join (M587, M588).
+    pub networks: Networks,
+    /// What it is after power-on (M552).
+    pub start: StartMode,
+    /// How its own network is called (M552).
+    pub access_point: AccessPointName,
+    /// Whether it makes its little waves (M291).
+    pub waves: bool,
+}
+
+impl Default for Settings {
+    /// `line-us`, no calibration, no network, a station that waves.
+    fn default() -> Self {
+        Self {
+            name: MachineName::default(),
+            calibration: Calibration::default(),
+            networks: Networks::new(),
+            start: StartMode::default(),
+            access_point: AccessPointName::default(),
+            waves: true,
+        }
+    }
 }
 
 /// One setting as it is stored: under its key, behind a version byte.
@@ -119,7 +164,8 @@ impl Settings {
         match setting {
             Setting::Name(name) => self.name = name,
             Setting::Calibration(calibration) => self.calibration = calibration,
-            Setting::Network(network) => self.network = Some(network),
+            // The first one always fits.
+            Setting::Network(network) => drop(self.networks.put(network)),
         }
     }
 }

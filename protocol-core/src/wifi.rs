@@ -93,6 +93,70 @@ impl Network {
     }
 }
 
+/// Networks that can be remembered; the next one is refused.
+pub const MAX_NETWORKS: usize = 8;
+
+/// [`MAX_NETWORKS`] are remembered already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Full;
+
+/// The networks that are remembered, each name once, in the order in which they came.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Networks(Vec<Network, MAX_NETWORKS>);
+
+impl Networks {
+    /// None.
+    pub const fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &Network> + Clone {
+        self.0.iter()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The network of that name.
+    pub fn find(&self, ssid: &Ssid) -> Option<&Network> {
+        self.0.iter().find(|network| network.ssid == *ssid)
+    }
+
+    /// Remembers a network, in the place of one of the same name if there is one.
+    ///
+    /// # Errors
+    /// [`Full`] when there is no place; nothing has changed then.
+    pub fn put(&mut self, network: Network) -> Result<(), Full> {
+        match self.0.iter_mut().find(|old| old.ssid == network.ssid) {
+            Some(old) => {
+                *old = network;
+                Ok(())
+            }
+            None => self.0.push(network).map_err(|_| Full),
+        }
+    }
+
+    /// Forgets the network of that name; says whether there was one.
+    pub fn remove(&mut self, ssid: &Ssid) -> bool {
+        let before = self.0.len();
+        self.0.retain(|network| network.ssid != *ssid);
+        self.0.len() < before
+    }
+
+    /// Forgets all of them.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
 /// How a network that was heard protects itself, as far as joining it matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Security {

@@ -211,7 +211,9 @@ fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<
     let mut memory =
         memory.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
     let mut settings = embassy_futures::block_on(memory.load());
-    settings.network.get_or_insert_with(own_network);
+    if settings.networks.is_empty() {
+        let _ = settings.networks.put(own_network());
+    }
     let house = House::new(data, settings, IDENTITY, VITALS);
     Ok((Box::leak(Box::new(house)), memory))
 }

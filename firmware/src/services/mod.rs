@@ -42,7 +42,7 @@ impl House {
         Self {
             arm: Arm::new(Machine::new(data, settings.calibration)),
             store: Store::new(),
-            wifi: Wifi::new(settings.network),
+            wifi: Wifi::new(settings.networks.iter().next().cloned()),
             panel: Panel::new(),
             identity,
             vitals,
