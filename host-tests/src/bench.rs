@@ -179,6 +179,7 @@ impl Bench {
                 calibration: self.machine.calibration(),
                 free_memory: 0,
                 reset_reason: "a test",
+                memory: "none",
                 last_panic: "",
             }),
             Request::Name => reply.name(&self.name),

@@ -1,7 +1,12 @@
 //! What the arm remembers, and its form in memory.
 
+mod parts;
+mod record;
+
+pub use record::MAX_RECORD;
+
 use crate::arm::Calibration;
-use crate::wifi::{MAX_NETWORK, Network, Networks};
+use crate::wifi::Networks;
 use heapless::String;
 
 /// Longest machine name, in bytes.
@@ -53,6 +58,29 @@ pub enum StartMode {
     StationLongPress,
 }
 
+impl StartMode {
+    /// Behind the S of M552, and in memory.
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Station => 1,
+            Self::AccessPoint => 2,
+            Self::AccessPointLocked => 3,
+            Self::StationLongPress => 4,
+        }
+    }
+
+    /// The mode of that number.
+    pub const fn from_number(number: u8) -> Option<Self> {
+        match number {
+            1 => Some(Self::Station),
+            2 => Some(Self::AccessPoint),
+            3 => Some(Self::AccessPointLocked),
+            4 => Some(Self::StationLongPress),
+            _ => None,
+        }
+    }
+}
+
 /// How the machine's own network is called (`reference/line-us.md`, section 5, M552).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AccessPointName {
@@ -61,6 +89,25 @@ pub enum AccessPointName {
     Setup,
     /// `P2`: as the machine.
     Machine,
+}
+
+impl AccessPointName {
+    /// Behind the P of M552, and in memory.
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Setup => 1,
+            Self::Machine => 2,
+        }
+    }
+
+    /// The naming of that number.
+    pub const fn from_number(number: u8) -> Option<Self> {
+        match number {
+            1 => Some(Self::Setup),
+            2 => Some(Self::Machine),
+            _ => None,
+        }
+    }
 }
 
 /// Everything that is kept across restarts.
@@ -94,87 +141,9 @@ impl Default for Settings {
     }
 }
 
-/// One setting as it is stored: under its key, behind a version byte.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Setting {
-    /// Under key 1.
-    Name(MachineName),
-    /// Under key 2.
-    Calibration(Calibration),
-    /// Under key 3.
-    Network(Network),
-}
-
-/// Longest stored form of a setting, in bytes.
-pub const MAX_SETTING: usize = 1 + if MAX_NETWORK > MAX_NAME {
-    MAX_NETWORK
-} else {
-    MAX_NAME
-};
-
-/// Version of the stored forms; a setting of another version reads as absent.
-const VERSION: u8 = 1;
-
-impl Setting {
-    /// Keys of all settings.
-    pub const KEYS: [u8; 3] = [1, 2, 3];
-
-    /// The key it is stored under.
-    pub const fn key(&self) -> u8 {
-        match self {
-            Self::Name(_) => 1,
-            Self::Calibration(_) => 2,
-            Self::Network(_) => 3,
-        }
-    }
-
-    /// Its stored form.
-    pub fn to_bytes(&self) -> heapless::Vec<u8, MAX_SETTING> {
-        let mut bytes = heapless::Vec::new();
-        // Both fit: MAX_SETTING is the version and the longest of them.
-        let _ = bytes.push(VERSION);
-        let _ = match self {
-            Self::Name(name) => bytes.extend_from_slice(name.as_str().as_bytes()),
-            Self::Calibration(calibration) => bytes.extend_from_slice(&calibration.to_bytes()),
-            Self::Network(network) => bytes.extend_from_slice(&network.to_bytes()),
-        };
-        bytes
-    }
-
-    /// What [`Self::to_bytes`] made; `None` for anything else.
-    pub fn from_bytes(key: u8, bytes: &[u8]) -> Option<Self> {
-        let (&VERSION, value) = bytes.split_first()? else {
-            return None;
-        };
-        match key {
-            1 => MachineName::new(core::str::from_utf8(value).ok()?).map(Self::Name),
-            2 => {
-                let value = value.try_into().ok()?;
-                Some(Self::Calibration(Calibration::from_bytes(value)))
-            }
-            3 => Network::from_bytes(value).map(Self::Network),
-            _ => None,
-        }
-    }
-}
-
-impl Settings {
-    /// Takes over one setting.
-    pub fn set(&mut self, setting: Setting) {
-        match setting {
-            Setting::Name(name) => self.name = name,
-            Setting::Calibration(calibration) => self.calibration = calibration,
-            // The first one always fits.
-            Setting::Network(network) => drop(self.networks.put(network)),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::Angles;
-    use crate::motion::Microdegrees;
 
     #[test]
     fn names_are_letters_digits_and_inner_hyphens() {
@@ -200,34 +169,6 @@ mod tests {
             "abcdefghijklmnopqrstuvwxyz0123456",
         ] {
             assert_eq!(MachineName::new(bad), None, "{bad:?}");
-        }
-    }
-
-    #[test]
-    fn settings_survive_their_bytes() {
-        let angles = Angles::from_array([1, -2, 3].map(Microdegrees::new));
-        for setting in [
-            Setting::Name(MachineName::new("robs-lineus").unwrap()),
-            Setting::Calibration(Calibration { offsets: angles }),
-        ] {
-            let bytes = setting.to_bytes();
-            assert_eq!(Setting::from_bytes(setting.key(), &bytes), Some(setting));
-        }
-    }
-
-    #[test]
-    fn foreign_bytes_are_no_setting() {
-        for key in 0..4 {
-            for bytes in [
-                &[][..],
-                &[0],
-                &[VERSION],
-                &[VERSION, 0xff],
-                &[2, b'a'],
-                &[VERSION; 200],
-            ] {
-                assert_eq!(Setting::from_bytes(key, bytes), None, "{key} {bytes:?}");
-            }
         }
     }
 }

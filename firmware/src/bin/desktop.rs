@@ -210,11 +210,13 @@ fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<
     let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
     let mut memory =
         memory.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
-    let mut settings = embassy_futures::block_on(memory.load());
-    if settings.networks.is_empty() {
-        let _ = settings.networks.put(own_network());
-    }
+    let (settings, _) = embassy_futures::block_on(memory.load());
+    let is_new = settings.networks.is_empty();
     let house = House::new(data, settings, IDENTITY, VITALS);
+    if is_new {
+        // Joined, but not remembered.
+        house.wifi.change(own_network());
+    }
     Ok((Box::leak(Box::new(house)), memory))
 }
 

@@ -46,7 +46,7 @@ async fn main(spawner: Spawner) {
         Memory::new(partition, whole)
     });
     let settings = match &mut memory {
-        Some(memory) => memory.load().await,
+        Some(memory) => memory.load().await.0,
         None => Settings::default(),
     };
     static HOUSE: StaticCell<House> = StaticCell::new();

@@ -77,7 +77,7 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         }
     };
     let settings = match select(memory.load(), alarm).await {
-        Either::First(settings) => settings,
+        Either::First((settings, _)) => settings,
         Either::Second(never) => never,
     };
     let identity = Identity {

@@ -18,7 +18,7 @@ use embedded_io_async::{Read, Write};
 use protocol_core::lineus::{Diagnostics, MAX_REPLY, Reply, Request, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 use protocol_core::motion::{Micros, Steps};
-use protocol_core::settings::{MachineName, Setting};
+use protocol_core::settings::MachineName;
 use protocol_core::wifi::Network;
 
 /// The port of Line-us.
@@ -173,25 +173,27 @@ fn diagnose(reply: &mut Reply, house: &House) {
         calibration,
         free_memory: (house.vitals.free_memory)(),
         reset_reason: house.vitals.reset_reason,
+        memory: house.store.health().text(),
         last_panic: house.vitals.last_panic,
     });
 }
 
 async fn rename(name: &MachineName, reply: &mut Reply, client: Client, house: &House) {
-    let _rest = house.arm.rest(client).await;
-    match house.store.save(Setting::Name(name.clone())).await {
-        Ok(()) => {
-            reply.name(name);
-            house.rename(name.clone());
-        }
+    let renamed = house.change(client, |settings| settings.name = name.clone());
+    match renamed.await {
+        Ok(()) => reply.name(name),
         Err(error) => refuse_store("name", &error, reply),
     }
 }
 
 /// The reply says that the network is remembered; joining it may well end this connection.
 async fn join(network: &Network, reply: &mut Reply, client: Client, house: &House) {
-    let _rest = house.arm.rest(client).await;
-    match house.store.save(Setting::Network(network.clone())).await {
+    let joined = house.change(client, |settings| {
+        settings.networks.clear();
+        // The first one always fits.
+        let _ = settings.networks.put(network.clone());
+    });
+    match joined.await {
         Ok(()) => {
             reply.ok();
             house.wifi.change(network.clone());
@@ -202,18 +204,14 @@ async fn join(network: &Network, reply: &mut Reply, client: Client, house: &Hous
 
 /// Makes the place where the arm rests the calibration point, or removes the calibration.
 async fn calibrate(here: bool, reply: &mut Reply, client: Client, house: &House) {
-    let _rest = house.arm.rest(client).await;
-    let calibration = match here {
-        true => house.arm.with(|machine| machine.calibration_here()),
-        false => Default::default(),
-    };
-    match house.store.save(Setting::Calibration(calibration)).await {
-        Ok(()) => {
-            house
-                .arm
-                .with(|machine| machine.set_calibration(calibration));
-            reply.ok();
-        }
+    let calibrated = house.change(client, |settings| {
+        settings.calibration = match here {
+            true => house.arm.with(|machine| machine.calibration_here()),
+            false => Default::default(),
+        };
+    });
+    match calibrated.await {
+        Ok(()) => reply.ok(),
         Err(error) => refuse_store("calibration", &error, reply),
     }
 }

@@ -15,9 +15,9 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use network::Wifi;
 use panel::Panel;
 use protocol_core::lineus::Identity;
-use protocol_core::machine::{ArmData, Machine};
+use protocol_core::machine::{ArmData, Client, Machine};
 use protocol_core::settings::{MachineName, Settings};
-use storage::Store;
+use storage::{Store, StoreError};
 
 /// What the services of one arm share.
 pub struct House {
@@ -33,29 +33,66 @@ pub struct House {
     pub identity: Identity,
     /// How it is.
     pub vitals: Vitals,
-    name: Mutex<CriticalSectionRawMutex, RefCell<MachineName>>,
+    settings: Mutex<CriticalSectionRawMutex, RefCell<Settings>>,
 }
 
 impl House {
     /// An arm at home, with the settings it remembers.
     pub fn new(data: ArmData, settings: Settings, identity: Identity, vitals: Vitals) -> Self {
+        let network = settings.networks.iter().next().cloned();
         Self {
             arm: Arm::new(Machine::new(data, settings.calibration)),
             store: Store::new(),
-            wifi: Wifi::new(settings.networks.iter().next().cloned()),
+            wifi: Wifi::new(network),
             panel: Panel::new(),
             identity,
             vitals,
-            name: Mutex::new(RefCell::new(settings.name)),
+            settings: Mutex::new(RefCell::new(settings)),
         }
+    }
+
+    /// Something short with the settings in force.
+    pub fn settings<T>(&self, f: impl FnOnce(&Settings) -> T) -> T {
+        self.settings.lock(|settings| f(&settings.borrow()))
     }
 
     /// The machine's name.
     pub fn name(&self) -> MachineName {
-        self.name.lock(|name| name.borrow().clone())
+        self.settings(|settings| settings.name.clone())
     }
 
-    fn rename(&self, new: MachineName) {
-        self.name.lock(|name| *name.borrow_mut() = new);
+    /// Changes settings: waits until the arm rests, and keeps it at rest while the changed settings are
+    /// stored. Then they are in force. Gives what `change` gave.
+    ///
+    /// `change` works on a copy. It is short, and the arm rests when it is called. If it changes nothing,
+    /// nothing is written.
+    ///
+    /// # Errors
+    /// When the memory does not take them: nothing has changed then.
+    pub async fn change<T>(
+        &self,
+        client: Client,
+        change: impl FnOnce(&mut Settings) -> T,
+    ) -> Result<T, StoreError> {
+        let _rest = self.arm.rest(client).await;
+        let mut turn = self.store.turn().await;
+        let answer = self.store.propose(|proposal| {
+            let now = self.settings(Settings::clone);
+            change(proposal.insert(now))
+        });
+        self.store.perform(&mut turn).await?;
+        if let Some(new) = self.store.propose(Option::take) {
+            self.put_in_force(new);
+        }
+        Ok(answer)
+    }
+
+    fn put_in_force(&self, new: Settings) {
+        let calibration = new.calibration;
+        let old = self.settings.lock(|settings| settings.replace(new));
+        if old.calibration != calibration {
+            self.arm
+                .with(|machine| machine.set_calibration(calibration));
+        }
     }
 }

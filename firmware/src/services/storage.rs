@@ -1,22 +1,23 @@
-//! Settings in flash, through `sequential-storage`: each under its key, the newest one counts.
+//! What is remembered: the way of the other services to the memory, and how the memory is.
 //!
 //! Written only while the arm rests: who asks for a store holds the arm at rest meanwhile.
 
+mod memory;
+mod page;
+
+pub use memory::Memory;
+
 use crate::log::warning;
-use core::fmt::{self, Debug};
-use core::ops::Range;
+use core::cell::{Cell, RefCell};
+use core::fmt;
+use embassy_sync::blocking_mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::mutex::Mutex;
+use embassy_sync::mutex::{Mutex, MutexGuard};
 use embassy_sync::signal::Signal;
 use embedded_storage_async::nor_flash::NorFlash;
-use protocol_core::settings::{MAX_SETTING, Setting, Settings};
-use sequential_storage::cache::{Cache, Uncached};
-use sequential_storage::map::{MapConfig, MapStorage};
+use protocol_core::settings::Settings;
 
-/// Room for the longest setting with its key, rounded up to any flash's word.
-const BUFFER: usize = (MAX_SETTING + 1).next_multiple_of(32) + 32;
-
-/// The setting could not be written, or did not read back.
+/// The settings could not be written, or did not read back: what was stored before still is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoreError;
 
@@ -26,115 +27,148 @@ impl fmt::Display for StoreError {
     }
 }
 
+/// How the memory is, for diagnostics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MemoryHealth {
+    /// This board has none, or has not found it.
+    #[default]
+    Missing,
+    /// Nothing has ever been stored.
+    Fresh,
+    /// Two good copies.
+    Sound,
+    /// The flash held something else than settings: the arm started with defaults.
+    Foreign,
+    /// One of the two copies was lost, and has been written again.
+    Repaired,
+    /// One of the two copies cannot be written any more: there is only the other.
+    Single,
+    /// What was to be stored last is not.
+    WornOut,
+}
+
+impl MemoryHealth {
+    /// In words, without a double quote.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Missing => "none",
+            Self::Fresh => "ok, nothing stored yet",
+            Self::Sound => "ok",
+            Self::Foreign => "held no settings, started with defaults",
+            Self::Repaired => "ok, one of two copies was lost and is restored",
+            Self::Single => "worn out, one of two copies cannot be written",
+            Self::WornOut => "worn out, does not take what is stored",
+        }
+    }
+}
+
+impl fmt::Display for MemoryHealth {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(self.text())
+    }
+}
+
+/// Counts stores, so that nobody takes an earlier one's outcome for his own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Ticket(u32);
+
 /// The way of the other services to the memory.
-#[derive(Default)]
+///
+/// Settings are a kilobyte: there is one place for those that are being stored, here, instead of one in
+/// each task that may want to.
 pub struct Store {
-    turn: Mutex<CriticalSectionRawMutex, ()>,
-    request: Signal<CriticalSectionRawMutex, Setting>,
-    outcome: Signal<CriticalSectionRawMutex, Result<(), StoreError>>,
+    turn: Mutex<CriticalSectionRawMutex, Ticket>,
+    proposal: blocking_mutex::Mutex<CriticalSectionRawMutex, RefCell<Option<Settings>>>,
+    request: Signal<CriticalSectionRawMutex, Ticket>,
+    outcome: Signal<CriticalSectionRawMutex, (Ticket, Result<(), StoreError>)>,
+    health: blocking_mutex::Mutex<CriticalSectionRawMutex, Cell<MemoryHealth>>,
+}
+
+impl Default for Store {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl Store {
     /// With nothing to do.
     pub const fn new() -> Self {
         Self {
-            turn: Mutex::new(()),
+            turn: Mutex::new(Ticket(0)),
+            proposal: blocking_mutex::Mutex::new(RefCell::new(None)),
             request: Signal::new(),
             outcome: Signal::new(),
+            health: blocking_mutex::Mutex::new(Cell::new(MemoryHealth::Missing)),
         }
     }
 
-    /// Stores a setting; returns when it has been read back. The arm must rest meanwhile.
+    /// Stores settings; returns when they have been read back. The arm must rest meanwhile. To change
+    /// settings, use [`super::House::change`].
     ///
     /// # Errors
-    /// [`StoreError`] when the flash refuses; the old value is what a restart finds then.
-    pub async fn save(&self, setting: Setting) -> Result<(), StoreError> {
-        let _turn = self.turn.lock().await;
-        self.outcome.reset();
-        self.request.signal(setting);
-        self.outcome.wait().await
+    /// [`StoreError`] when the flash refuses; the old settings are what a restart finds then.
+    pub async fn save(&self, settings: Settings) -> Result<(), StoreError> {
+        let mut turn = self.turn().await;
+        self.propose(|proposal| *proposal = Some(settings));
+        self.perform(&mut turn).await
+    }
+
+    /// How the memory is.
+    pub fn health(&self) -> MemoryHealth {
+        self.health.lock(Cell::get)
+    }
+
+    /// Waits until nobody else stores.
+    pub(super) async fn turn(&self) -> MutexGuard<'_, CriticalSectionRawMutex, Ticket> {
+        self.turn.lock().await
+    }
+
+    /// Something short with what is to be stored; only for whose turn it is.
+    pub(super) fn propose<T>(&self, f: impl FnOnce(&mut Option<Settings>) -> T) -> T {
+        self.proposal.lock(|proposal| f(&mut proposal.borrow_mut()))
+    }
+
+    /// Has the proposal stored.
+    pub(super) async fn perform(&self, turn: &mut Ticket) -> Result<(), StoreError> {
+        *turn = Ticket(turn.0.wrapping_add(1));
+        self.request.signal(*turn);
+        loop {
+            let (ticket, outcome) = self.outcome.wait().await;
+            if ticket == *turn {
+                return outcome;
+            }
+        }
     }
 
     /// The storage service of a board without memory: nothing is stored, and everybody is told so.
     pub async fn refuse(&self) -> ! {
+        self.tell(MemoryHealth::Missing);
         loop {
-            self.request.wait().await;
-            self.outcome.signal(Err(StoreError));
+            let ticket = self.request.wait().await;
+            self.outcome.signal((ticket, Err(StoreError)));
         }
     }
 
-    /// The storage service: writes what [`Self::save`] is given, for ever.
+    /// The storage service: writes what it is given, for ever.
     pub async fn run<F: NorFlash>(&self, mut memory: Memory<F>) -> ! {
+        self.tell(memory.health());
         loop {
-            let setting = self.request.wait().await;
-            let outcome = memory.store(&setting).await;
-            if outcome.is_err() {
-                warning!("setting {} could not be stored", setting.key());
-            }
-            self.outcome.signal(outcome);
-        }
-    }
-}
-
-/// Nothing is cached: settings are read at the start and written by hand.
-type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
-
-/// A range of flash that holds the settings.
-pub struct Memory<F: NorFlash> {
-    map: MapStorage<u8, F, NoCache>,
-}
-
-impl<F: NorFlash> Memory<F> {
-    /// Over `range` of `flash`, which is made of at least two whole pages; `None` when it is not.
-    pub fn new(flash: F, range: Range<u32>) -> Option<Self> {
-        let config = MapConfig::try_new(range).ok()?;
-        Some(Self {
-            map: MapStorage::new(flash, config, Cache::new_uncached()),
-        })
-    }
-
-    /// What is remembered; what is absent has its default. Flash that holds something else than
-    /// settings is erased, or nothing could ever be stored there.
-    pub async fn load(&mut self) -> Settings {
-        let mut settings = Settings::default();
-        for key in Setting::KEYS {
-            match self.fetch(key).await {
-                Ok(Some(setting)) => settings.set(setting),
-                Ok(None) => {}
-                Err(StoreError) => {
-                    warning!("the settings cannot be read: starting with defaults");
-                    if self.map.erase_all().await.is_err() {
-                        warning!("the settings cannot be erased");
-                    }
-                    return Settings::default();
+            let ticket = self.request.wait().await;
+            self.propose(|proposal| {
+                if let Some(settings) = proposal {
+                    memory.stage(settings);
                 }
+            });
+            let outcome = memory.commit().await;
+            self.tell(memory.health());
+            if outcome.is_err() {
+                warning!("the settings could not be stored");
             }
+            self.outcome.signal((ticket, outcome));
         }
-        settings
     }
 
-    async fn fetch(&mut self, key: u8) -> Result<Option<Setting>, StoreError> {
-        let mut buffer = [0; BUFFER];
-        let bytes = self.map.fetch_item::<&[u8]>(&mut buffer, &key).await;
-        let bytes = bytes.map_err(|_| StoreError)?;
-        Ok(bytes.and_then(|bytes| Setting::from_bytes(key, bytes)))
-    }
-
-    async fn store(&mut self, setting: &Setting) -> Result<(), StoreError> {
-        let key = setting.key();
-        // Writing the same value again would only wear the flash.
-        if self.fetch(key).await?.as_ref() == Some(setting) {
-            return Ok(());
-        }
-        let mut buffer = [0; BUFFER];
-        let bytes = setting.to_bytes();
-        self.map
-            .store_item(&mut buffer, &key, &bytes.as_slice())
-            .await
-            .map_err(|_| StoreError)?;
-        match self.fetch(key).await? == Some(setting.clone()) {
-            true => Ok(()),
-            false => Err(StoreError),
-        }
+    fn tell(&self, health: MemoryHealth) {
+        self.health.lock(|told| told.set(health));
     }
 }

@@ -52,6 +52,8 @@ pub struct Diagnostics<'a> {
     pub free_memory: u32,
     /// Why it started.
     pub reset_reason: &'a str,
+    /// How the memory for the settings is.
+    pub memory: &'a str,
     /// The last words of a firmware that panicked before, if there are any.
     pub last_panic: &'a str,
 }
@@ -154,7 +156,7 @@ impl Reply {
         self.compose(format_args!(
             "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
-             FreeHeap:{} ResetReason:\"{}\"{}",
+             FreeHeap:{} ResetReason:\"{}\" Memory:\"{}\"{}",
             state.name.as_str(),
             state.identity.serial(),
             Uptime(state.uptime),
@@ -163,6 +165,7 @@ impl Reply {
             z.rounded(),
             state.free_memory,
             state.reset_reason,
+            state.memory,
             LastPanic(state.last_panic),
         ));
     }
@@ -362,11 +365,12 @@ mod tests {
                 },
                 free_memory: u32::MAX,
                 reset_reason: "the watchdog bit after a long silence",
+                memory: "worn out, and what is worse, it does not take what is stored",
                 last_panic: &"panicked at \"somewhere\"\n".repeat(9),
             });
         });
         assert!(
-            text.contains("silence\" LastPanic:\"panicked at 'somewhere'?")
+            text.contains("stored\" LastPanic:\"panicked at 'somewhere'?")
                 && text.ends_with("...\""),
             "{text}"
         );
