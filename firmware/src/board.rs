@@ -6,6 +6,7 @@
 use heapless::Vec;
 use protocol_core::machine::SetPoint;
 use protocol_core::motion::Micros;
+pub use protocol_core::panel::Colour;
 use protocol_core::wifi::{Heard, Joined, Network};
 
 /// The three servos.
@@ -24,17 +25,6 @@ pub trait Servos {
 pub trait Frames {
     /// Waits for the next frame.
     async fn next(&mut self);
-}
-
-/// A colour of the light, each part 0 (off) to 255.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Colour {
-    /// Red.
-    pub red: u8,
-    /// Green.
-    pub green: u8,
-    /// Blue.
-    pub blue: u8,
 }
 
 /// The light.

@@ -5,7 +5,8 @@ use protocol_core::arm::Calibration;
 use protocol_core::lineus::{Diagnostics, Identity, Reply, Request, Session};
 use protocol_core::machine::{ArmData, Client, Errand, MAX_CLIENTS, Machine, Report, SetPoint};
 use protocol_core::motion::{Micros, Steps};
-use protocol_core::settings::MachineName;
+use protocol_core::settings::{MachineName, Settings};
+use protocol_core::wifi::{Networks, Phase, Status};
 use std::array;
 
 /// Between two set-points where a test does not say otherwise, in microseconds.
@@ -177,6 +178,12 @@ impl Bench {
                 uptime: Micros::new(self.next_us),
                 position: self.machine.position(),
                 calibration: self.machine.calibration(),
+                wifi: &Status {
+                    setup: false,
+                    phase: Phase::Searching,
+                    refused: None,
+                },
+                networks: 0,
                 free_memory: 0,
                 reset_reason: "a test",
                 memory: "none",
@@ -187,8 +194,15 @@ impl Bench {
                 self.at_rest(client, |bench| bench.name = name);
                 reply.name(&self.name);
             }
-            // Whether it is joined is nothing that the arm does.
-            Request::Join(_) => reply.ok(),
+            // Networks and starts are nothing that the arm does.
+            Request::Start => reply.start(&Settings::default()),
+            Request::Waves => reply.waves(true),
+            Request::Networks => reply.networks(&[], &Networks::new()),
+            Request::SetStart { .. }
+            | Request::SetWaves(_)
+            | Request::Remember { .. }
+            | Request::Forget(_)
+            | Request::ForgetAll => reply.ok(),
             Request::Calibrate => {
                 self.at_rest(client, |bench| {
                     let here = bench.machine.calibration_here();

@@ -16,6 +16,7 @@ pub mod arm;
 pub mod lineus;
 pub mod machine;
 pub mod motion;
+pub mod panel;
 pub mod settings;
 pub mod text;
 pub mod wifi;

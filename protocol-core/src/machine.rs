@@ -11,7 +11,7 @@
 use crate::arm::{Angles, Calibration, HOME_ANGLES, PenLift, Pulses, ServoRange, forward, inverse};
 use crate::motion::{
     Coordinate, DEFAULT_STEPS, HOME, Line, Microdegrees, Micros, PEN_DOWN, PEN_UP, Position, Rapid,
-    Steps, WideCoordinate, closest, hold,
+    Steps, Wave, WideCoordinate, closest, hold,
 };
 use heapless::Deque;
 
@@ -123,6 +123,8 @@ pub enum Manner {
 pub enum Errand {
     /// Go somewhere.
     Move(Manner, Target),
+    /// Make a little wave and be back: nothing happens while the pen is down.
+    Wave,
     /// Come to rest and stay there until [`Machine::release`]: for what must not be done in motion.
     Rest,
 }
@@ -157,6 +159,7 @@ pub enum Report {
 enum Motion {
     Line(Line),
     Rapid(Rapid),
+    Wave(Wave),
 }
 
 impl Motion {
@@ -164,6 +167,7 @@ impl Motion {
         match self {
             Self::Line(line) => line.duration(),
             Self::Rapid(rapid) => rapid.duration(),
+            Self::Wave(_) => Wave::DURATION,
         }
     }
 
@@ -171,6 +175,7 @@ impl Motion {
         match self {
             Self::Line(line) => line.end(),
             Self::Rapid(rapid) => rapid.end(),
+            Self::Wave(wave) => wave.end(),
         }
     }
 
@@ -178,6 +183,8 @@ impl Motion {
         match self {
             Self::Line(line) => line.leaves_the_area(),
             Self::Rapid(rapid) => rapid.leaves_the_area(),
+            // Held at the edge where it would.
+            Self::Wave(_) => false,
         }
     }
 
@@ -186,6 +193,7 @@ impl Motion {
         match self {
             Self::Line(line) => line.at(elapsed),
             Self::Rapid(rapid) => rapid.at(elapsed),
+            Self::Wave(wave) => wave.at(elapsed),
         }
     }
 }
@@ -365,6 +373,11 @@ impl Machine {
         self.active.is_some() || !self.waiting.is_empty() || self.last.position != self.position
     }
 
+    /// Whether the arm rests, nobody wants it to move, and nobody keeps it at rest.
+    pub fn is_idle(&self) -> bool {
+        !self.is_busy() && self.resting_for.is_none()
+    }
+
     /// Where the nib is now: the position of the last set-point, or where the arm rests.
     pub const fn position(&self) -> Position {
         match self.active {
@@ -433,10 +446,27 @@ impl Machine {
                 self.lift_at = None;
                 self.start(*manner, target)
             }
+            Errand::Wave => self.wave(),
             Errand::Rest => {
                 self.resting_for = Some(client);
                 Report::Resting
             }
+        }
+    }
+
+    fn wave(&mut self) -> Report {
+        if !self.position.pen_is_down() {
+            let motion = Motion::Wave(Wave::new(self.position));
+            self.active = Some(Active {
+                begun: self.clock,
+                ends: self.clock + motion.duration(),
+                short: false,
+                motion,
+            });
+        }
+        Report::Moving {
+            end: self.position,
+            limited: None,
         }
     }
 

@@ -17,6 +17,7 @@ use firmware::boards::scripted_radio::ScriptedRadio;
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{Server, serve};
+use firmware::services::network;
 use firmware::services::storage::Memory;
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
@@ -197,7 +198,7 @@ async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
 async fn wifi(house: &'static House) {
     static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
     let radio = ScriptedRadio::new(&[OWN_NETWORK], &CUT);
-    house.wifi.run(radio, NoAddress, &house.panel).await;
+    network::run(house, radio, NoAddress).await;
 }
 
 #[embassy_executor::task]
@@ -210,13 +211,11 @@ fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<
     let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
     let mut memory =
         memory.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
-    let (settings, _) = embassy_futures::block_on(memory.load());
-    let is_new = settings.networks.is_empty();
-    let house = House::new(data, settings, IDENTITY, VITALS);
-    if is_new {
-        // Joined, but not remembered.
-        house.wifi.change(own_network());
+    let (mut settings, _) = embassy_futures::block_on(memory.load());
+    if settings.networks.is_empty() {
+        let _ = settings.networks.put(own_network());
     }
+    let house = House::new(data, settings, IDENTITY, VITALS);
     Ok((Box::leak(Box::new(house)), memory))
 }
 

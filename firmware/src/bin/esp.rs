@@ -18,9 +18,10 @@ use firmware::boards::esp::system::Watchdog;
 use firmware::boards::esp::{Button, last_panic, pwm_timer, system};
 use firmware::services::House;
 use firmware::services::line_us::{ANYWHERE, Server};
-use firmware::services::panel::Lamp;
 use firmware::services::storage::Memory;
+use firmware::services::{network, panel};
 use protocol_core::machine::{Client, MAX_CLIENTS};
+use protocol_core::panel::Lamp;
 use protocol_core::settings::Settings;
 use static_cell::StaticCell;
 
@@ -75,7 +76,7 @@ fn spawn(
     };
     let tcp = net.connections();
     spawner.spawn(network_stack(runner)?);
-    spawner.spawn(network(house, radio, net)?);
+    spawner.spawn(wifi(house, radio, net)?);
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(tcp, client, house)?);
     }
@@ -126,7 +127,7 @@ async fn light(house: &'static House, light: Light) {
 
 #[embassy_executor::task]
 async fn button(house: &'static House, button: Button) {
-    house.panel.watch(button).await;
+    panel::watch(house, button).await;
 }
 
 #[embassy_executor::task]
@@ -135,8 +136,8 @@ async fn network_stack(mut runner: NetRunner) {
 }
 
 #[embassy_executor::task]
-async fn network(house: &'static House, radio: EspRadio, net: Net) {
-    house.wifi.run(radio, net, &house.panel).await;
+async fn wifi(house: &'static House, radio: EspRadio, net: Net) {
+    network::run(house, radio, net).await;
 }
 
 /// Feeds the watchdog as long as the servo tick lives, and this executor, and tells of frames that

@@ -23,6 +23,7 @@ use firmware::services::House;
 use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::storage::Memory;
+use firmware::services::{network, panel};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -115,7 +116,7 @@ fn start(
     let resources = RESOURCES.init(StackResources::new());
     let (stack, runner) =
         embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
-    spawner.spawn(network(runner)?);
+    spawner.spawn(network_stack(runner)?);
     spawner.spawn(tell_address(stack)?);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
     for client in (0..).map_while(Client::new) {
@@ -161,20 +162,17 @@ async fn light(house: &'static House) {
 
 #[embassy_executor::task]
 async fn button(house: &'static House) {
-    house.panel.watch(Button::new()).await;
+    panel::watch(house, Button::new()).await;
 }
 
 #[embassy_executor::task]
 async fn wifi(house: &'static House) {
     static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    house
-        .wifi
-        .run(ScriptedRadio::new(AIR, &CUT), Wired, &house.panel)
-        .await;
+    network::run(house, ScriptedRadio::new(AIR, &CUT), Wired).await;
 }
 
 #[embassy_executor::task]
-async fn network(mut runner: Runner<'static, VirtNet>) {
+async fn network_stack(mut runner: Runner<'static, VirtNet>) {
     runner.run().await;
 }
 

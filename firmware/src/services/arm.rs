@@ -8,6 +8,7 @@ use core::array;
 use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::mutex::{Mutex as Turns, MutexGuard as Turn};
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
 use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report};
@@ -17,6 +18,8 @@ use protocol_core::motion::Micros;
 pub struct Arm {
     machine: Mutex<CriticalSectionRawMutex, RefCell<Machine>>,
     reports: [Signal<CriticalSectionRawMutex, Report>; MAX_ASKERS],
+    /// Several services ask in the name of [`Client::HOUSE`], which has one errand at a time as well.
+    house: Turns<CriticalSectionRawMutex, ()>,
 }
 
 impl Arm {
@@ -25,6 +28,7 @@ impl Arm {
         Self {
             machine: Mutex::new(RefCell::new(machine)),
             reports: array::from_fn(|_| Signal::new()),
+            house: Turns::new(()),
         }
     }
 
@@ -48,8 +52,27 @@ impl Arm {
 
     /// Waits until the arm rests, and keeps it at rest until the guard is dropped.
     pub async fn rest(&self, client: Client) -> Rest<'_> {
+        let turn = match client == Client::HOUSE {
+            true => Some(self.house.lock().await),
+            false => None,
+        };
         self.errand(client, &Errand::Rest).await;
-        Rest { arm: self, client }
+        Rest {
+            arm: self,
+            client,
+            _turn: turn,
+        }
+    }
+
+    /// Begins a little wave if the arm has nothing to do and its pen is up; says whether it does.
+    pub fn wave(&self) -> bool {
+        self.with(|machine| {
+            let idle = machine.is_idle() && !machine.position().pen_is_down();
+            if idle {
+                machine.take(Client::HOUSE, &Errand::Wave);
+            }
+            idle
+        })
     }
 
     /// The servo tick: one set-point in each of the servos' frames, which are `length` apart, for ever.
@@ -119,6 +142,7 @@ impl Frames for TimedFrames {
 pub struct Rest<'a> {
     arm: &'a Arm,
     client: Client,
+    _turn: Option<Turn<'a, CriticalSectionRawMutex, ()>>,
 }
 
 impl Drop for Rest<'_> {

@@ -15,11 +15,11 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
-use protocol_core::lineus::{Diagnostics, MAX_REPLY, Reply, Request, Session};
+use protocol_core::lineus::{Diagnostics, MAX_REPLY, Refusal, Reply, Request, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 use protocol_core::motion::{Micros, Steps};
-use protocol_core::settings::MachineName;
-use protocol_core::wifi::Network;
+use protocol_core::settings::{MachineName, Settings};
+use protocol_core::wifi::{Full, Heard, MAX_NETWORKS, Network, Networks, Password, Ssid};
 
 /// The port of Line-us.
 pub const PORT: u16 = 1337;
@@ -64,6 +64,7 @@ impl Server {
             };
             self.count(1);
             info!("client {} connected", peer);
+            house.greet_first_client().await;
             serve(&mut socket, client, house).await;
             // It may be gone already; then there is nothing to close.
             let _ = with_timeout(FAREWELL, socket.close(Close::Both)).await;
@@ -155,7 +156,38 @@ async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &H
         Request::Diagnostics => diagnose(reply, house),
         Request::Name => reply.name(&house.name()),
         Request::Rename(name) => rename(name, reply, client, house).await,
-        Request::Join(network) => join(network, reply, client, house).await,
+        Request::Start => house.settings(|settings| reply.start(settings)),
+        Request::SetStart { mode, name } => {
+            let set = |settings: &mut Settings| {
+                settings.start = mode.unwrap_or(settings.start);
+                settings.access_point = name.unwrap_or(settings.access_point);
+                Ok(())
+            };
+            change("start mode", set, reply, client, house).await;
+        }
+        Request::Waves => reply.waves(house.settings(|settings| settings.waves)),
+        Request::SetWaves(on) => {
+            let set = |settings: &mut Settings| {
+                settings.waves = *on;
+                Ok(())
+            };
+            change("setting", set, reply, client, house).await;
+        }
+        Request::Networks => list(reply, house).await,
+        Request::Remember { ssid, password } => {
+            remember(ssid, password.as_ref(), reply, client, house).await;
+        }
+        Request::Forget(ssid) => {
+            forget(ssid, reply, client, house).await;
+        }
+        Request::ForgetAll => {
+            let forget = |settings: &mut Settings| {
+                settings.networks.clear();
+                Ok(())
+            };
+            change("networks", forget, reply, client, house).await;
+            house.wifi.changed();
+        }
         Request::Calibrate => calibrate(true, reply, client, house).await,
         Request::ClearCalibration => calibrate(false, reply, client, house).await,
     }
@@ -171,6 +203,8 @@ fn diagnose(reply: &mut Reply, house: &House) {
         uptime: Micros::new(Instant::now().as_micros()),
         position,
         calibration,
+        wifi: &house.wifi.status(),
+        networks: house.settings(|settings| settings.networks.len()),
         free_memory: (house.vitals.free_memory)(),
         reset_reason: house.vitals.reset_reason,
         memory: house.store.health().text(),
@@ -186,19 +220,83 @@ async fn rename(name: &MachineName, reply: &mut Reply, client: Client, house: &H
     }
 }
 
-/// The reply says that the network is remembered; joining it may well end this connection.
-async fn join(network: &Network, reply: &mut Reply, client: Client, house: &House) {
-    let joined = house.change(client, |settings| {
-        settings.networks.clear();
-        // The first one always fits.
-        let _ = settings.networks.put(network.clone());
-    });
-    match joined.await {
-        Ok(()) => {
-            reply.ok();
-            house.wifi.change(network.clone());
+/// Networks that are heard and networks that are remembered.
+async fn list(reply: &mut Reply, house: &House) {
+    let fill = |heard: &[Heard]| {
+        house.settings(|settings| reply.networks(heard, &settings.networks));
+    };
+    house.wifi.with_heard(fill).await;
+}
+
+/// A station remembers the network and stays where it is. In setup the reply comes first, because the
+/// attempt to join may end this connection, and the network is remembered if it succeeds.
+async fn remember(
+    ssid: &Ssid,
+    password: Option<&Password>,
+    reply: &mut Reply,
+    client: Client,
+    house: &House,
+) {
+    if house.wifi.is_setup() {
+        match house.settings(|settings| completed(ssid, password, &settings.networks)) {
+            Ok(network) => {
+                reply.ok();
+                house.wifi.attempt(network);
+            }
+            Err(refusal) => reply.refuse(&refusal),
         }
-        Err(error) => refuse_store("network", &error, reply),
+        return;
+    }
+    let put = |settings: &mut Settings| {
+        let network = completed(ssid, password, &settings.networks)?;
+        settings
+            .networks
+            .put(network)
+            .map_err(|Full| Refusal::TooManyNetworks)
+    };
+    change("network", put, reply, client, house).await;
+    house.wifi.changed();
+}
+
+/// A network for which there is a place; one that comes without a password has the one that is
+/// remembered, or is open.
+fn completed<'a>(
+    ssid: &Ssid,
+    password: Option<&Password>,
+    known: &Networks,
+) -> Result<Network, Refusal<'a>> {
+    let remembered = known.find(ssid);
+    if remembered.is_none() && known.len() == MAX_NETWORKS {
+        return Err(Refusal::TooManyNetworks);
+    }
+    let password = password.or(remembered.and_then(|known| known.password.as_ref()));
+    Ok(Network {
+        ssid: ssid.clone(),
+        password: password.cloned(),
+    })
+}
+
+async fn forget(ssid: &Ssid, reply: &mut Reply, client: Client, house: &House) {
+    let remove = |settings: &mut Settings| match settings.networks.remove(ssid) {
+        true => Ok(()),
+        false => Err(Refusal::NoSuchNetwork(ssid.as_bytes())),
+    };
+    change("network", remove, reply, client, house).await;
+    house.wifi.changed();
+}
+
+/// Changes settings, and answers `ok`, or why not.
+async fn change<'a>(
+    what: &str,
+    change: impl FnOnce(&mut Settings) -> Result<(), Refusal<'a>>,
+    reply: &mut Reply,
+    client: Client,
+    house: &House,
+) {
+    match house.change(client, change).await {
+        Ok(Ok(())) => reply.ok(),
+        Ok(Err(refusal)) => reply.refuse(&refusal),
+        Err(error) => refuse_store(what, &error, reply),
     }
 }
 

@@ -10,12 +10,15 @@ pub mod storage;
 use crate::board::Vitals;
 use arm::Arm;
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_time::Timer;
 use network::Wifi;
 use panel::Panel;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, Machine};
+use protocol_core::motion::WAVE;
 use protocol_core::settings::{MachineName, Settings};
 use storage::{Store, StoreError};
 
@@ -34,20 +37,21 @@ pub struct House {
     /// How it is.
     pub vitals: Vitals,
     settings: Mutex<CriticalSectionRawMutex, RefCell<Settings>>,
+    greeted: AtomicBool,
 }
 
 impl House {
     /// An arm at home, with the settings it remembers.
     pub fn new(data: ArmData, settings: Settings, identity: Identity, vitals: Vitals) -> Self {
-        let network = settings.networks.iter().next().cloned();
         Self {
             arm: Arm::new(Machine::new(data, settings.calibration)),
             store: Store::new(),
-            wifi: Wifi::new(network),
+            wifi: Wifi::new(),
             panel: Panel::new(),
             identity,
             vitals,
             settings: Mutex::new(RefCell::new(settings)),
+            greeted: AtomicBool::new(false),
         }
     }
 
@@ -59,6 +63,29 @@ impl House {
     /// The machine's name.
     pub fn name(&self) -> MachineName {
         self.settings(|settings| settings.name.clone())
+    }
+
+    /// A little wave, if the arm is to make any and has nothing else to do; says whether it makes one.
+    fn wave(&self) -> bool {
+        self.settings(|settings| settings.waves) && self.arm.wave()
+    }
+
+    /// Waves before the first client after power-on is greeted, and is home again.
+    async fn greet_first_client(&self) {
+        if !self.greeted.swap(true, Ordering::Relaxed) && self.wave() {
+            Timer::after_micros(WAVE.get()).await;
+        }
+    }
+
+    /// Forgets everything: factory reset.
+    ///
+    /// # Errors
+    /// When the memory does not take it: nothing has changed then.
+    async fn forget_everything(&self) -> Result<(), StoreError> {
+        let forget = |settings: &mut Settings| *settings = Settings::default();
+        self.change(Client::HOUSE, forget).await?;
+        self.wifi.restart();
+        Ok(())
     }
 
     /// Changes settings: waits until the arm rests, and keeps it at rest while the changed settings are

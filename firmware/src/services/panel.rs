@@ -1,120 +1,150 @@
 //! Light and button.
 
-use crate::board::{Colour, Light};
-use crate::log::warning;
+use super::House;
+use crate::board::Light;
+use crate::log::{info, warning};
+use core::cell::Cell;
 use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Timer};
+use embassy_time::{Duration, Instant, Timer};
+use embedded_hal::digital::InputPin;
 use embedded_hal_async::digital::Wait;
+use protocol_core::motion::Micros;
+use protocol_core::panel::{Button, Gesture, LONG_PRESS, Lamp, POWER_ON, VERY_LONG_PRESS};
+use protocol_core::settings::StartMode;
 
-/// What the light says (`reference/line-us.md`, section 6).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lamp {
-    /// White: starting.
-    Starting,
-    /// Blue, flashing: looking for the network.
-    Searching,
-    /// Blue: in the network.
-    Connected,
-    /// Red, flashing: the setup network is open.
-    Setup,
-    /// Red and white in turn: something does not work.
-    Error,
+/// How long the light tells that everything could not be forgotten.
+const COMPLAINT: Duration = Duration::from_secs(5);
+
+#[derive(Clone, Copy)]
+struct Shown {
+    /// What the machine does.
+    lamp: Lamp,
+    /// What a person has to see before that.
+    first: Option<Lamp>,
 }
 
-impl Lamp {
-    /// The two colours it changes between; the same twice for a steady light.
-    pub const fn colours(self) -> [Colour; 2] {
-        const OFF: Colour = colour(0, 0, 0);
-        const RED: Colour = colour(64, 0, 0);
-        const BLUE: Colour = colour(0, 0, 64);
-        const WHITE: Colour = colour(40, 40, 40);
-        match self {
-            Self::Starting => [WHITE, WHITE],
-            Self::Searching => [BLUE, OFF],
-            Self::Connected => [BLUE, BLUE],
-            Self::Setup => [RED, OFF],
-            Self::Error => [RED, WHITE],
-        }
+/// The way of the other services to the light.
+pub struct Panel {
+    shown: Mutex<CriticalSectionRawMutex, Cell<Shown>>,
+    changed: Signal<CriticalSectionRawMutex, ()>,
+}
+
+impl Default for Panel {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
-const fn colour(red: u8, green: u8, blue: u8) -> Colour {
-    Colour { red, green, blue }
-}
-
-/// Half a flash.
-pub const FLASH: Duration = Duration::from_millis(500);
-/// A button that bounces is quiet again after this.
-pub const BOUNCE: Duration = Duration::from_millis(30);
-
-/// The way of the other services to light and button.
-#[derive(Default)]
-pub struct Panel {
-    lamp: Signal<CriticalSectionRawMutex, Lamp>,
-    press: Signal<CriticalSectionRawMutex, ()>,
-}
-
 impl Panel {
-    /// With nothing to show.
+    /// At the start.
     pub const fn new() -> Self {
         Self {
-            lamp: Signal::new(),
-            press: Signal::new(),
+            shown: Mutex::new(Cell::new(Shown {
+                lamp: Lamp::Starting,
+                first: None,
+            })),
+            changed: Signal::new(),
         }
     }
 
     /// Shows something from now on.
     pub fn show(&self, lamp: Lamp) {
-        self.lamp.signal(lamp);
+        self.change(|shown| Shown { lamp, ..shown });
     }
 
-    /// Waits for a press of the button.
-    pub async fn pressed(&self) {
-        self.press.wait().await;
+    /// Shows something instead, until it is told `None`.
+    fn show_first(&self, first: Option<Lamp>) {
+        self.change(|shown| Shown { first, ..shown });
     }
 
-    /// A press before now is not meant for what comes next.
-    pub fn forget_press(&self) {
-        self.press.reset();
+    fn change(&self, f: impl FnOnce(Shown) -> Shown) {
+        self.shown.lock(|shown| shown.set(f(shown.get())));
+        self.changed.signal(());
     }
 
-    /// The light, for ever.
+    /// The light, for ever. White lasts as long as a press means a factory reset.
     pub async fn shine(&self, mut light: impl Light) -> ! {
-        let mut lamp = Lamp::Starting;
+        let white_until = Instant::now() + duration(POWER_ON);
         loop {
-            let [on, off] = lamp.colours();
-            light.show(on);
-            if on == off {
-                lamp = self.lamp.wait().await;
-                continue;
-            }
-            if let Either::First(next) = select(self.lamp.wait(), Timer::after(FLASH)).await {
-                lamp = next;
-                continue;
-            }
-            light.show(off);
-            if let Either::First(next) = select(self.lamp.wait(), Timer::after(FLASH)).await {
-                lamp = next;
+            let shown = self.shown.lock(Cell::get);
+            let lamp = match shown.first {
+                Some(first) => first,
+                None if Instant::now() < white_until => Lamp::Starting,
+                None => shown.lamp,
+            };
+            for flash in lamp.pattern() {
+                light.show(flash.colour);
+                let time = Timer::after_millis(flash.millis.into());
+                if let Either::First(()) = select(self.changed.wait(), time).await {
+                    break;
+                }
             }
         }
     }
+}
 
-    /// The button, low while it is pressed, for ever.
-    pub async fn watch(&self, mut button: impl Wait) -> ! {
-        loop {
-            let press = async {
-                button.wait_for_low().await?;
-                self.press.signal(());
-                Timer::after(BOUNCE).await;
-                button.wait_for_high().await
+/// The button, low while it is pressed, for ever.
+pub async fn watch(house: &House, mut pin: impl Wait + InputPin) -> ! {
+    let mut button = Button::new(now());
+    loop {
+        let long = house.settings(|settings| match settings.start {
+            StartMode::StationLongPress => VERY_LONG_PRESS,
+            _ => LONG_PRESS,
+        });
+        let Ok(pressed) = pin.is_low() else {
+            warning!("the button does not work");
+            Timer::after_secs(1).await;
+            continue;
+        };
+        if let Some(gesture) = button.update(pressed, long, now()) {
+            act(house, gesture).await;
+            continue;
+        }
+        let change = async {
+            // By level: a change between looking and waiting is not missed.
+            let changed = match pressed {
+                true => pin.wait_for_high().await,
+                false => pin.wait_for_low().await,
             };
-            if press.await.is_err() {
-                warning!("the button does not work");
+            if changed.is_err() {
                 Timer::after_secs(1).await;
             }
-            Timer::after(BOUNCE).await;
+        };
+        match button.next_look(long) {
+            Some(look) => {
+                let look = Timer::at(Instant::from_micros(look.get()));
+                select(change, look).await;
+            }
+            None => change.await,
         }
     }
+}
+
+async fn act(house: &House, gesture: Gesture) {
+    match gesture {
+        Gesture::Short | Gesture::Long => house.wifi.press(gesture),
+        Gesture::ResetWarning => house.panel.show_first(Some(Lamp::ResetWarning)),
+        Gesture::ResetCancelled => house.panel.show_first(None),
+        Gesture::Reset => {
+            if house.forget_everything().await.is_err() {
+                warning!("the settings could not be forgotten");
+                house.panel.show_first(Some(Lamp::Error));
+                Timer::after(COMPLAINT).await;
+            } else {
+                info!("everything is forgotten");
+            }
+            house.panel.show_first(None);
+        }
+    }
+}
+
+fn now() -> Micros {
+    Micros::new(Instant::now().as_micros())
+}
+
+const fn duration(micros: Micros) -> Duration {
+    Duration::from_micros(micros.get())
 }

@@ -191,9 +191,10 @@ fn a_refusal_names_the_letter_and_changes_nothing() {
         ("G94 P5 S31", "S"),
         ("G00 X1100 Y\"5", "Y"),
         ("M9999", "M9999"),
-        ("M587", "M587"),
         ("M587 Sx Py", "P must"),
-        ("M588 S*", "M588"),
+        ("M588 Sx", "'x'"),
+        ("M552 S5", "S must"),
+        ("M291 Sx", "S"),
         ("M997", "M997"),
     ] {
         let reply = client.say(line);

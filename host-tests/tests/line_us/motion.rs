@@ -10,6 +10,17 @@ fn arm(arguments: &[&str]) -> (tempfile::TempDir, Desktop) {
     (folder, arm)
 }
 
+/// A hundred times slower than life, and without a wave before the greeting, which would take more than a
+/// minute.
+fn slow_arm() -> (tempfile::TempDir, Desktop) {
+    let folder = tempfile::tempdir().expect("there is room for a folder");
+    let fast = Desktop::start(folder.path(), &["--speed", "max"]);
+    assert_eq!(fast.client().say("M291 S2"), "ok ");
+    fast.stop();
+    let arm = Desktop::start(folder.path(), &["--speed", "0.01"]);
+    (folder, arm)
+}
+
 /// X, Y, Z of a reply.
 fn place(reply: &str) -> [i32; 3] {
     let numbers: Vec<i32> = reply
@@ -23,8 +34,8 @@ fn place(reply: &str) -> [i32; 3] {
 
 #[test]
 fn a_move_from_rest_is_answered_while_the_arm_still_has_its_way_to_go() {
-    // A hundred times slower than life: 670 ms become more than a minute.
-    let (_folder, arm) = arm(&["--speed", "0.01"]);
+    // 670 ms become more than a minute.
+    let (_folder, arm) = slow_arm();
     let (mut drawer, mut watcher) = (arm.client(), arm.client());
     assert_eq!(drawer.say("G01 Z0"), "ok X:1000 Y:1000 Z:0");
     let [_, _, z] = place(&watcher.say("M114"));
@@ -46,7 +57,7 @@ fn a_move_in_motion_is_answered_when_the_prior_move_has_completed() {
 
 #[test]
 fn a_second_move_in_motion_is_not_answered_before_the_first_has_completed() {
-    let (_folder, arm) = arm(&["--speed", "0.01"]);
+    let (_folder, arm) = slow_arm();
     let (mut drawer, mut watcher) = (arm.client(), arm.client());
     drawer.say("G01 Z0");
     drawer.send("G01 X1400\n");
@@ -57,7 +68,7 @@ fn a_second_move_in_motion_is_not_answered_before_the_first_has_completed() {
 
 #[test]
 fn questions_are_answered_in_motion() {
-    let (_folder, arm) = arm(&["--speed", "0.01"]);
+    let (_folder, arm) = slow_arm();
     let mut client = arm.client();
     client.say("G01 Z0");
     for (question, answer) in [

@@ -3,9 +3,9 @@
 use super::refusal::Refusal;
 use crate::machine::Manner;
 use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
-use crate::settings::{MAX_NAME, MachineName};
+use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
 use crate::text::Words;
-use crate::wifi::{MAX_PASSWORD, MAX_SSID, Network, Password, Ssid};
+use crate::wifi::{MAX_PASSWORD, MAX_SSID, Password, Ssid};
 
 /// A valid command, its numbers as written: not yet scaled, not yet limited.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,8 +48,32 @@ pub enum Command {
     Name,
     /// `M550 P`.
     Rename(MachineName),
+    /// M552.
+    Start,
+    /// `M552 S P`.
+    SetStart {
+        /// What the machine is after power-on.
+        mode: Option<StartMode>,
+        /// How its own network is called.
+        name: Option<AccessPointName>,
+    },
+    /// M291.
+    Waves,
+    /// `M291 S1`, `M291 S2`.
+    SetWaves(bool),
+    /// M587.
+    Networks,
     /// `M587 S P`.
-    Join(Network),
+    Remember {
+        /// The network's name.
+        ssid: Ssid,
+        /// Its password; without one, the one that is remembered, or none.
+        password: Option<Password>,
+    },
+    /// `M588 S`.
+    Forget(Ssid),
+    /// `M588 S*`.
+    ForgetAll,
 }
 
 /// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
@@ -101,8 +125,11 @@ fn other_than_a_move<'a>(
         (b'M', 122) => without_parameters(&mut words, Command::Diagnostics),
         (b'M', 374) => calibration(&mut words),
         (b'M', 550) => name(&mut words),
+        (b'M', 291) => waves(&mut words),
+        (b'M', 552) => start(&mut words),
         (b'M', 587) => network(&mut words),
-        (b'M', code @ (588 | 997)) => Err(Refusal::NotYet(code)),
+        (b'M', 588) => forget(&mut words),
+        (b'M', 997) => Err(Refusal::NotYet),
         _ => Err(Words::new(line).unknown().into()),
     }
 }
@@ -220,7 +247,7 @@ fn name<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
             let text = words.text('P')?;
             let name = text
                 .unescape::<MAX_NAME>()
-                .and_then(|name| MachineName::new(&name))
+                .and_then(|name| MachineName::new(str::from_utf8(&name).ok()?))
                 .ok_or(Refusal::BadName(text.raw()))?;
             without_parameters(words, Command::Rename(name))
         }
@@ -228,29 +255,89 @@ fn name<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     }
 }
 
+fn waves<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    match words.letter()? {
+        None => Ok(Command::Waves),
+        Some('S') => {
+            let on = choice(words, 'S', 2)? == 1;
+            without_parameters(words, Command::SetWaves(on))
+        }
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn start<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    let mut letters = Letters::default();
+    let (mut mode, mut name) = (None, None);
+    while let Some(letter) = words.letter()? {
+        letters.once(letter)?;
+        match letter {
+            'S' => mode = StartMode::from_number(choice(words, letter, 4)?),
+            'P' => name = AccessPointName::from_number(choice(words, letter, 2)?),
+            _ => return Err(Refusal::UnknownParameter(letter)),
+        }
+    }
+    Ok(match (mode, name) {
+        (None, None) => Command::Start,
+        (mode, name) => Command::SetStart { mode, name },
+    })
+}
+
 fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     let mut letters = Letters::default();
     let (mut ssid, mut password) = (None, None);
     while let Some(letter) = words.letter()? {
         letters.once(letter)?;
-        let text = match letter {
-            'S' | 'P' => words.text(letter)?,
+        match letter {
+            'S' => ssid = Some(network_name(words)?),
+            'P' => {
+                let phrase = words.text(letter)?.unescape::<MAX_PASSWORD>();
+                let phrase = phrase.and_then(|phrase| Password::new(&phrase));
+                password = Some(phrase.ok_or(Refusal::BadPassword)?);
+            }
             _ => return Err(Refusal::UnknownParameter(letter)),
-        };
-        if letter == 'S' {
-            let name = text.unescape::<MAX_SSID>();
-            let name = name.and_then(|name| Ssid::new(name.as_bytes()));
-            ssid = Some(name.ok_or(Refusal::BadText('S', text.raw(), "1 to 32 bytes"))?);
-        } else {
-            let phrase = text.unescape::<MAX_PASSWORD>();
-            let phrase = phrase.and_then(|phrase| Password::new(phrase.as_bytes()));
-            password = Some(phrase.ok_or(Refusal::BadPassword)?);
         }
     }
-    match ssid {
-        Some(ssid) => Ok(Command::Join(Network { ssid, password })),
-        None if password.is_some() => Err(Refusal::Missing('S')),
-        None => Err(Refusal::NotYet(587)),
+    match (ssid, password) {
+        (Some(ssid), password) => Ok(Command::Remember { ssid, password }),
+        (None, Some(_)) => Err(Refusal::Missing('S')),
+        (None, None) => Ok(Command::Networks),
+    }
+}
+
+fn forget<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    match words.letter()? {
+        None => Err(Refusal::Missing('S')),
+        Some('S') => {
+            let ssid = network_name(words)?;
+            let command = match ssid.as_bytes() {
+                b"*" => Command::ForgetAll,
+                _ => Command::Forget(ssid),
+            };
+            without_parameters(words, command)
+        }
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn network_name<'a>(words: &mut Words<'a>) -> Result<Ssid, Refusal<'a>> {
+    let text = words.text('S')?;
+    text.unescape::<MAX_SSID>()
+        .and_then(|name| Ssid::new(&name))
+        .ok_or(Refusal::BadText('S', text.raw(), "1 to 32 bytes"))
+}
+
+/// A whole number from 1 to `most`.
+fn choice<'a>(words: &mut Words<'a>, letter: char, most: u8) -> Result<u8, Refusal<'a>> {
+    const BITS: u32 = 16;
+    let value = words.fixed(letter, BITS, most.into())?;
+    let whole = value
+        .ok()
+        .filter(|bits| bits % (1 << BITS) == 0)
+        .map(|bits| bits >> BITS);
+    match whole.map(u8::try_from) {
+        Some(Ok(number @ 1..)) => Ok(number),
+        _ => Err(Refusal::NoChoice(letter, most)),
     }
 }
 
@@ -261,7 +348,12 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
         Some(letter @ ('S' | 'P'))
             if matches!(
                 command,
-                Command::Angles | Command::ClearCalibration | Command::Rename(_)
+                Command::Angles
+                    | Command::ClearCalibration
+                    | Command::Rename(_)
+                    | Command::SetWaves(_)
+                    | Command::Forget(_)
+                    | Command::ForgetAll
             ) =>
         {
             Err(Refusal::Repeated(letter))

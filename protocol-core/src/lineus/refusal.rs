@@ -1,8 +1,8 @@
 //! Why a line is refused, and the one place where that becomes text.
 
 use crate::settings::MAX_NAME;
-use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt};
-use crate::wifi::{MAX_PASSWORD, MIN_PASSWORD};
+use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt, excerpt_of_bytes};
+use crate::wifi::{MAX_NETWORKS, MAX_PASSWORD, MIN_PASSWORD};
 use core::fmt;
 
 /// Why a line is refused; nothing has changed then.
@@ -12,8 +12,8 @@ pub enum Refusal<'a> {
     TooLong,
     /// The line is no words.
     Words(WordError<'a>),
-    /// A command that this firmware will know, but does not yet.
-    NotYet(u32),
+    /// M997, which this firmware will know, but does not yet.
+    NotYet,
     /// A letter that the command does not have.
     UnknownParameter(char),
     /// A letter that the command needs.
@@ -31,12 +31,18 @@ pub enum Refusal<'a> {
     },
     /// A scale of zero, or so near to it that it would be.
     ZeroScale,
+    /// Not one of the whole numbers from 1 to this one.
+    NoChoice(char, u8),
     /// A text that the parameter cannot have, and what it may be.
-    BadText(char, &'a str, &'static str),
+    BadText(char, &'a [u8], &'static str),
     /// A password of a length that none has; what it is stays a secret.
     BadPassword,
     /// No machine name.
-    BadName(&'a str),
+    BadName(&'a [u8]),
+    /// More networks than can be remembered.
+    TooManyNetworks,
+    /// No network of this name is remembered.
+    NoSuchNetwork(&'a [u8]),
 }
 
 impl<'a> From<WordError<'a>> for Refusal<'a> {
@@ -56,16 +62,9 @@ impl fmt::Display for Refusal<'_> {
         match *self {
             Self::TooLong => write!(out, "line longer than {MAX_LINE} bytes"),
             Self::Words(error) => words(error, out),
-            Self::NotYet(997) => {
+            Self::NotYet => {
                 out.write_str("M997 is missing: this firmware cannot update itself yet")
             }
-            Self::NotYet(587) => {
-                out.write_str("M587 without S is missing: this firmware cannot list networks yet")
-            }
-            Self::NotYet(code) => write!(
-                out,
-                "M{code} is missing: this firmware cannot forget networks yet"
-            ),
             Self::Missing(letter) => write!(out, "parameter {letter} is missing"),
             Self::UnknownParameter(letter) => write!(out, "unknown parameter {letter}"),
             Self::Repeated(letter) => write!(out, "parameter {letter} is repeated"),
@@ -76,15 +75,31 @@ impl fmt::Display for Refusal<'_> {
             } => {
                 write!(out, "{letter} is out of range, {least} to {most}")
             }
+            Self::NoChoice(letter, most) => {
+                write!(out, "{letter} must be a whole number, 1 to {most}")
+            }
             Self::ZeroScale => out.write_str("S must not be zero"),
             Self::BadText(letter, text, expected) => {
-                write!(out, "{letter} is '{}', it may be {expected}", short(text))
+                write!(
+                    out,
+                    "{letter} is '{}', it may be {expected}",
+                    excerpt_of_bytes(text, MAX_EXCERPT)
+                )
             }
             Self::BadPassword => write!(out, "P must be {MIN_PASSWORD} to {MAX_PASSWORD} bytes"),
             Self::BadName(text) => write!(
                 out,
                 "P is '{}', a name is 1 to {MAX_NAME} letters, digits and inner hyphens",
-                short(text)
+                excerpt_of_bytes(text, MAX_EXCERPT)
+            ),
+            Self::TooManyNetworks => write!(
+                out,
+                "{MAX_NETWORKS} networks are remembered, no more fit: forget one with M588"
+            ),
+            Self::NoSuchNetwork(name) => write!(
+                out,
+                "no network '{}' is remembered",
+                excerpt_of_bytes(name, MAX_EXCERPT)
             ),
         }
     }

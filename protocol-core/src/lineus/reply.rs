@@ -4,16 +4,21 @@ use super::refusal::Refusal;
 use crate::arm::{Angles, Calibration};
 use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
-use crate::settings::MachineName;
-use crate::text::excerpt;
+use crate::settings::{MachineName, Settings};
+use crate::text::{MAX_EXCERPT, excerpt, excerpt_of_bytes};
+use crate::wifi::{Heard, Joined, MAX_NETWORKS, MAX_SSID, Networks, Phase, Ssid, Status};
 use core::fmt::{self, Write};
 use heapless::Vec;
 
 /// Ends every message to a client, the greeting included.
 pub const TERMINATOR: &str = "\r\n\0";
 /// Longest message, terminator included. Everyday replies stay below 256 bytes, because some clients
-/// read one packet for each reply into a buffer of that size; diagnostics may be longer.
-pub const MAX_REPLY: usize = 512;
+/// read one packet for each reply into a buffer of that size; diagnostics and lists of networks may be
+/// longer. Every network that is remembered fits into such a list, whatever its name.
+pub const MAX_REPLY: usize = 768;
+const _: () = assert!(
+    "ok ".len() + MAX_NETWORKS * (" \"\":1".len() + 2 * MAX_SSID) + TERMINATOR.len() <= MAX_REPLY
+);
 /// Version in the greeting: the level of the original's protocol that is complete, then our own.
 pub const VERSION: &str = concat!("1.0.4 Quill ", env!("CARGO_PKG_VERSION"));
 
@@ -48,6 +53,10 @@ pub struct Diagnostics<'a> {
     pub position: Position,
     /// The servos' offsets.
     pub calibration: Calibration,
+    /// What the network is doing.
+    pub wifi: &'a Status,
+    /// How many networks are remembered.
+    pub networks: usize,
     /// Free memory in bytes.
     pub free_memory: u32,
     /// Why it started.
@@ -136,9 +145,9 @@ impl Reply {
 
     /// What the machine is: a guest in somebody's network, or on its own.
     pub fn capabilities(&mut self, name: &MachineName, own_network: bool) {
-        let mode = if own_network { "AP" } else { "ST" };
         self.compose(format_args!(
-            "ok CONNECTMODE:{mode} MACHINENAME:{}",
+            "ok CONNECTMODE:{} MACHINENAME:{}",
+            mode(own_network),
             name.as_str()
         ));
     }
@@ -146,6 +155,73 @@ impl Reply {
     /// How the machine is called.
     pub fn name(&mut self, name: &MachineName) {
         self.compose(format_args!("ok MACHINENAME:{}", name.as_str()));
+    }
+
+    /// What the machine is after power-on.
+    pub fn start(&mut self, settings: &Settings) {
+        self.compose(format_args!(
+            "ok S:{} P:{}",
+            settings.start.number(),
+            settings.access_point.number()
+        ));
+    }
+
+    /// Whether the machine waves.
+    pub fn waves(&mut self, on: bool) {
+        self.compose(format_args!("ok S:{}", if on { 1 } else { 2 }));
+    }
+
+    /// Networks: those that are heard, in the order given, which is by strength, each with 1 where it is
+    /// remembered and 2 where it is not; then those that are remembered and not heard, with 3
+    /// (`spec 1.0.4a, M587`). Where not all fit, the last ones that are not remembered are left out.
+    ///
+    /// In quotes, a quote is written twice, as in a command. A name with a byte that ends a line cannot be
+    /// written and is left out.
+    pub fn networks(&mut self, heard: &[Heard], known: &Networks) {
+        self.restart();
+        self.push("ok ");
+        let unheard = known
+            .iter()
+            .map(|network| &network.ssid)
+            .filter(|ssid| heard.iter().all(|other| other.ssid != **ssid));
+        let visible = heard.iter().enumerate().filter_map(|(place, network)| {
+            let ssid = &network.ssid;
+            let again = heard.iter().take(place).any(|other| other.ssid == *ssid);
+            let known = known.find(ssid).is_some();
+            (!again).then_some((ssid, if known { '1' } else { '2' }))
+        });
+        let entries = visible.chain(unheard.map(|ssid| (ssid, '3')));
+        let mut entries = entries.filter(|(ssid, _)| can_be_written(ssid));
+        // Room for those that are remembered and come later.
+        let mut reserved: usize = entries
+            .clone()
+            .filter(|(_, state)| *state != '2')
+            .map(|(ssid, _)| entry_length(ssid))
+            .sum();
+        entries.by_ref().for_each(|(ssid, state)| {
+            let length = entry_length(ssid);
+            if state != '2' {
+                reserved -= length;
+            }
+            if self.text.len() + length + reserved + TERMINATOR.len() <= MAX_REPLY {
+                self.push_entry(ssid, state);
+            }
+        });
+        self.push(TERMINATOR);
+    }
+
+    fn push_entry(&mut self, ssid: &Ssid, state: char) {
+        if !self.text.ends_with(b" ") {
+            self.push(" ");
+        }
+        self.push("\"");
+        for byte in ssid.as_bytes() {
+            let quote = *byte == b'"';
+            for _ in 0..1 + usize::from(quote) {
+                let _ = self.text.push(*byte);
+            }
+        }
+        let _ = write!(self.text, "\":{state}");
     }
 
     /// How the machine is.
@@ -156,13 +232,17 @@ impl Reply {
         self.compose(format_args!(
             "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
-             FreeHeap:{} ResetReason:\"{}\" Memory:\"{}\"{}",
+             WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
+             Memory:\"{}\"{}",
             state.name.as_str(),
             state.identity.serial(),
             Uptime(state.uptime),
             x.rounded(),
             y.rounded(),
             z.rounded(),
+            mode(state.wifi.setup),
+            state.networks,
+            InWords(state.wifi),
             state.free_memory,
             state.reset_reason,
             state.memory,
@@ -238,6 +318,52 @@ fn tell(limited: Limited) -> &'static str {
         Limited::Target { lifted: true } => "out of reach: going to the closest point, pen lifted",
         Limited::Target { lifted: false } => "out of reach: going to the closest point",
         Limited::Way => "the way leaves the drawing area: held at its edge",
+    }
+}
+
+const fn mode(own_network: bool) -> &'static str {
+    if own_network { "AP" } else { "ST" }
+}
+
+fn can_be_written(ssid: &Ssid) -> bool {
+    !ssid
+        .as_bytes()
+        .iter()
+        .any(|byte| matches!(byte, b'\r' | b'\n' | 0))
+}
+
+/// Longest form of an entry in a list of networks: ` "name":1`.
+fn entry_length(ssid: &Ssid) -> usize {
+    let name = ssid.as_bytes();
+    let quotes = name.iter().filter(|&&byte| byte == b'"').count();
+    name.len() + quotes + " \"\":1".len()
+}
+
+/// What the network is doing, without double quotes.
+struct InWords<'a>(&'a Status);
+
+impl fmt::Display for InWords<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Status { phase, refused, .. } = self.0;
+        let name = |ssid| excerpt_of_bytes(Ssid::as_bytes(ssid), MAX_EXCERPT);
+        match phase {
+            Phase::Searching => out.write_str("searching")?,
+            Phase::Connected(ssid) => write!(out, "connected to {}", name(ssid))?,
+            Phase::Setup => out.write_str("setup")?,
+            Phase::Trying(ssid) => write!(out, "trying {}", name(ssid))?,
+            Phase::Fault => out.write_str("the radio does not work")?,
+        }
+        let Some((ssid, outcome)) = refused else {
+            return Ok(());
+        };
+        write!(out, "; {}: ", name(ssid))?;
+        match outcome {
+            Joined::Yes => Ok(()),
+            Joined::NotFound => out.write_str("not found"),
+            Joined::WrongPassword => out.write_str("wrong password"),
+            Joined::Unfit => out.write_str("WPA3 only, or no password"),
+            Joined::Failed(reason) => write!(out, "not joined, reason {reason}"),
+        }
     }
 }
 
@@ -351,6 +477,115 @@ mod tests {
         );
     }
 
+    fn ssid(name: &[u8]) -> Ssid {
+        Ssid::new(name).unwrap()
+    }
+
+    fn heard(name: &[u8], signal_dbm: i8) -> Heard {
+        Heard {
+            ssid: ssid(name),
+            security: crate::wifi::Security::Password,
+            signal_dbm,
+        }
+    }
+
+    fn remembered(names: &[&[u8]]) -> Networks {
+        let mut networks = Networks::new();
+        for name in names {
+            let network = crate::wifi::Network {
+                ssid: ssid(name),
+                password: crate::wifi::Password::new(b"correct horse"),
+            };
+            networks.put(network).unwrap();
+        }
+        networks
+    }
+
+    #[test]
+    fn networks_as_the_specification_writes_them() {
+        let around = [heard(b"my-ssid", -40), heard(b"another-ssid", -60)];
+        let known = remembered(&[b"yet-another-one", b"my-ssid"]);
+        assert_eq!(
+            said(|reply| reply.networks(&around, &known)),
+            "ok \"my-ssid\":1 \"another-ssid\":2 \"yet-another-one\":3"
+        );
+        assert_eq!(said(|reply| reply.networks(&[], &Networks::new())), "ok ");
+    }
+
+    #[test]
+    fn names_with_quotes_and_names_that_come_twice_or_cannot_be_written() {
+        let around = [
+            heard(b"say \"hi\"", -40),
+            heard(b"mesh", -50),
+            heard(b"line\nfeed", -55),
+            heard(b"mesh", -60),
+        ];
+        let known = remembered(&[b"mesh", b"nul\0"]);
+        let list = said(|reply| reply.networks(&around, &known));
+        assert_eq!(list, "ok \"say \"\"hi\"\"\":2 \"mesh\":1");
+        // What is listed can be sent back as it is.
+        let text = crate::text::Words::new(&list.as_bytes()[3..])
+            .text('S')
+            .unwrap();
+        assert_eq!(&text.unescape::<32>().unwrap()[..], b"say \"hi\"");
+    }
+
+    #[test]
+    fn a_list_is_bounded_and_holds_every_network_that_is_remembered() {
+        let quotes = |index: usize| {
+            let mut name = [b'"'; MAX_SSID];
+            name[index] = b'x';
+            name
+        };
+        let names: Vec<_, MAX_NETWORKS> = (0..MAX_NETWORKS).map(quotes).collect();
+        let known: Vec<&[u8], MAX_NETWORKS> = names.iter().map(|name| &name[..]).collect();
+        let around: std::vec::Vec<Heard> = (0..16)
+            .map(|index| {
+                heard(
+                    std::format!("a-network-of-a-neighbour-{index}").as_bytes(),
+                    -40,
+                )
+            })
+            .collect();
+        let mut reply = Reply::new();
+        reply.networks(&around, &remembered(&known));
+        assert!(reply.as_bytes().len() <= MAX_REPLY);
+        let list = reply.message();
+        assert_eq!(list.matches(":3").count(), MAX_NETWORKS, "{list}");
+        assert!(list.matches(":2").count() >= 2, "{list}");
+    }
+
+    #[test]
+    fn the_state_of_the_network_in_words() {
+        for (phase, refused, words) in [
+            (Phase::Searching, None, "searching"),
+            (
+                Phase::Searching,
+                Some((ssid(b"my \"home\""), Joined::WrongPassword)),
+                "searching; my 'home': wrong password",
+            ),
+            (
+                Phase::Setup,
+                Some((ssid(b"caf\xff"), Joined::NotFound)),
+                "setup; caf?: not found",
+            ),
+            (Phase::Connected(ssid(b"home")), None, "connected to home"),
+            (Phase::Trying(ssid(b"home")), None, "trying home"),
+            (
+                Phase::Fault,
+                Some((ssid(b"home"), Joined::Failed(203))),
+                "the radio does not work; home: not joined, reason 203",
+            ),
+        ] {
+            let status = Status {
+                setup: false,
+                phase,
+                refused,
+            };
+            assert_eq!(InWords(&status).to_string(), words);
+        }
+    }
+
     #[test]
     fn every_token_of_the_diagnostics_has_a_colon() {
         let longest = MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap();
@@ -363,6 +598,12 @@ mod tests {
                 calibration: Calibration {
                     offsets: Angles::from_array([i32::MIN; 3].map(Microdegrees::new)),
                 },
+                wifi: &Status {
+                    setup: true,
+                    phase: Phase::Trying(ssid(&[b'"'; MAX_SSID])),
+                    refused: Some((ssid(&[b'"'; MAX_SSID]), Joined::Failed(u16::MAX))),
+                },
+                networks: MAX_NETWORKS,
                 free_memory: u32::MAX,
                 reset_reason: "the watchdog bit after a long silence",
                 memory: "worn out, and what is worse, it does not take what is stored",

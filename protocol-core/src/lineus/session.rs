@@ -5,9 +5,9 @@ use super::refusal::Refusal;
 use super::reply::Reply;
 use crate::machine::{Errand, Manner, Target};
 use crate::motion::{StepSize, Transform, WideCoordinate};
-use crate::settings::MachineName;
+use crate::settings::{AccessPointName, MachineName, StartMode};
 use crate::text::LineBuffer;
-use crate::wifi::Network;
+use crate::wifi::{Password, Ssid};
 
 /// What a line asks for, in arm coordinates; each is answered by exactly one reply.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,8 +39,33 @@ pub enum Request {
     Name,
     /// To be answered by [`Reply::name`].
     Rename(MachineName),
-    /// Remember a network, answer [`Reply::ok`], join it.
-    Join(Network),
+    /// To be answered by [`Reply::start`].
+    Start,
+    /// To be remembered, and answered by [`Reply::ok`].
+    SetStart {
+        /// What the machine is after power-on.
+        mode: Option<StartMode>,
+        /// How its own network is called.
+        name: Option<AccessPointName>,
+    },
+    /// To be answered by [`Reply::waves`].
+    Waves,
+    /// To be remembered, and answered by [`Reply::ok`].
+    SetWaves(bool),
+    /// To be answered by [`Reply::networks`].
+    Networks,
+    /// A station remembers the network and answers [`Reply::ok`]; in setup the answer comes first, and
+    /// the network is remembered when it has been joined.
+    Remember {
+        /// The network's name.
+        ssid: Ssid,
+        /// Its password; without one, the one that is remembered, or none.
+        password: Option<Password>,
+    },
+    /// To be forgotten, and answered by [`Reply::ok`].
+    Forget(Ssid),
+    /// Every network is to be forgotten; answered by [`Reply::ok`].
+    ForgetAll,
 }
 
 /// What belongs to one connection: the line being received, scale and origin.
@@ -120,7 +145,20 @@ fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Repl
         Command::ClearCalibration => Request::ClearCalibration,
         Command::Name => Request::Name,
         Command::Rename(name) => Request::Rename(name.clone()),
-        Command::Join(network) => Request::Join(network.clone()),
+        Command::Start => Request::Start,
+        Command::SetStart { mode, name } => Request::SetStart {
+            mode: *mode,
+            name: *name,
+        },
+        Command::Waves => Request::Waves,
+        Command::SetWaves(on) => Request::SetWaves(*on),
+        Command::Networks => Request::Networks,
+        Command::Remember { ssid, password } => Request::Remember {
+            ssid: ssid.clone(),
+            password: password.clone(),
+        },
+        Command::Forget(ssid) => Request::Forget(ssid.clone()),
+        Command::ForgetAll => Request::ForgetAll,
     }
 }
 
@@ -248,18 +286,22 @@ mod tests {
                 "P is 'a b', a name is 1 to 32 letters, digits and inner hyphens",
             ),
             ("M550 P\"open", "P has no closing quote"),
-            (
-                "M587",
-                "M587 without S is missing: this firmware cannot list networks yet",
-            ),
             ("M587 Pcorrect-horse", "parameter S is missing"),
             ("M587 S\"\"", "S is '', it may be 1 to 32 bytes"),
             ("M587 Shome Pshort", "P must be 8 to 63 bytes"),
             ("M587 Shome Qx", "unknown parameter Q"),
-            (
-                "M588 S*",
-                "M588 is missing: this firmware cannot forget networks yet",
-            ),
+            ("M588", "parameter S is missing"),
+            ("M588 Pword", "unknown parameter P"),
+            ("M588 Sa Sb", "parameter S is repeated"),
+            ("M552 S5", "S must be a whole number, 1 to 4"),
+            ("M552 S0", "S must be a whole number, 1 to 4"),
+            ("M552 S1.5", "S must be a whole number, 1 to 4"),
+            ("M552 P3", "P must be a whole number, 1 to 2"),
+            ("M552 S1 S2", "parameter S is repeated"),
+            ("M552 X1", "unknown parameter X"),
+            ("M291 S3", "S must be a whole number, 1 to 2"),
+            ("M291 S", "S has no number"),
+            ("M291 S1 S1", "parameter S is repeated"),
             (
                 "M997",
                 "M997 is missing: this firmware cannot update itself yet",
@@ -327,15 +369,58 @@ mod tests {
             ),
             ("M587 Sopen", "open", ""),
         ] {
-            let (ssid, password) = (
-                Ssid::new(ssid.as_bytes()),
-                Password::new(password.as_bytes()),
-            );
-            let network = Network {
-                ssid: ssid.unwrap(),
-                password,
+            let request = Request::Remember {
+                ssid: Ssid::new(ssid.as_bytes()).unwrap(),
+                password: Password::new(password.as_bytes()),
             };
-            assert_eq!(only(line).0, Request::Join(network), "{line}");
+            assert_eq!(only(line).0, request, "{line}");
+        }
+        assert_eq!(only("M587").0, Request::Networks);
+        for (line, ssid) in [
+            ("M588 Smy-ssid", "my-ssid"),
+            ("m588 s\"two words\"", "two words"),
+            ("M588 S**", "**"),
+            ("M588 S\"a \"\"b\"\"\"", "a \"b\""),
+        ] {
+            let request = Request::Forget(Ssid::new(ssid.as_bytes()).unwrap());
+            assert_eq!(only(line).0, request, "{line}");
+        }
+        for line in ["M588 S*", "M588 S\"*\"", "m588 s* "] {
+            assert_eq!(only(line).0, Request::ForgetAll, "{line}");
+        }
+    }
+
+    #[test]
+    fn names_of_networks_are_bytes() {
+        // Everything but what ends a line.
+        let name = b"\xff\x01\xc3(\"; \t\x7f\xfe";
+        let quoted = b"M587 S\"\xff\x01\xc3(\"\"; \t\x7f\xfe\" P\"12345678\"\n";
+        let found = requests(&mut Session::new(), quoted);
+        let request = Request::Remember {
+            ssid: Ssid::new(name).unwrap(),
+            password: Password::new(b"12345678"),
+        };
+        assert_eq!(found, [(request, String::new())]);
+    }
+
+    #[test]
+    fn choices_of_start_and_waves() {
+        let set = |mode, name| Request::SetStart { mode, name };
+        for (line, request) in [
+            ("M552", Request::Start),
+            ("M552 S1", set(Some(StartMode::Station), None)),
+            (
+                "M552 S2 P2",
+                set(Some(StartMode::AccessPoint), Some(AccessPointName::Machine)),
+            ),
+            ("M552 S3", set(Some(StartMode::AccessPointLocked), None)),
+            ("M552 S4.0", set(Some(StartMode::StationLongPress), None)),
+            ("M552 P1", set(None, Some(AccessPointName::Setup))),
+            ("M291", Request::Waves),
+            ("M291 S1", Request::SetWaves(true)),
+            ("M291 S2", Request::SetWaves(false)),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
         }
     }
 
@@ -352,8 +437,6 @@ mod tests {
             &b"\xff\xfe"[..],
             b"G01 X\xff",
             b"G28 \xc3",
-            b"M550 P\xff",
-            b"M550 P\"\xff\"",
             b"G28 ; \xff",
             b"G01 (\xff) X5",
         ] {
@@ -368,6 +451,12 @@ mod tests {
                 [refused, (Request::Position, String::new())],
                 "{line:?}"
             );
+        }
+        for line in [&b"M550 P\xff\n"[..], b"M550 P\"\xff\"\n"] {
+            let found = requests(&mut Session::new(), line);
+            let reason = "P is '?', a name is 1 to 32 letters, digits and inner hyphens";
+            let refused = std::format!("error INFO:\"{reason}\"");
+            assert_eq!(found, [(Request::Answered, refused)], "{line:?}");
         }
     }
 
@@ -401,11 +490,11 @@ mod tests {
         let quotes = "\"\"";
         let line = std::format!("M587 S\"{}\" P\"{}\"", quotes.repeat(32), quotes.repeat(63));
         assert!(line.len() <= crate::text::MAX_LINE);
-        let network = Network {
+        let request = Request::Remember {
             ssid: Ssid::new(&[b'"'; 32]).unwrap(),
             password: Password::new(&[b'"'; 63]),
         };
-        assert_eq!(only(&line).0, Request::Join(network));
+        assert_eq!(only(&line).0, request);
     }
 
     /// Lines that are nearly right, where the mistakes hide.

@@ -1,5 +1,6 @@
 //! The arm in time: what begins when, what it answers, where it is.
 
+extern crate std;
 use super::*;
 use crate::motion::contains;
 
@@ -322,4 +323,58 @@ fn a_jump_of_the_calibration_shows_in_the_frames() {
     // The pen was told 45 degrees, which without calibration is below the paper.
     machine.set_calibration(Calibration::default());
     assert!(run(&mut machine, 2020, 2020).moving);
+}
+
+#[test]
+fn a_wave_goes_to_both_sides_and_comes_back() {
+    let mut machine = arm();
+    assert_eq!(
+        machine.take(Client::HOUSE, &Errand::Wave),
+        Some(moving(1000, 1000, 1000))
+    );
+    let places: std::vec::Vec<Position> = (0..=80)
+        .map(|frame| machine.tick(Micros::new(frame * 10_000)).position)
+        .collect();
+    let units = |position: &Position| position.y.to_f64();
+    let most = places.iter().map(units).fold(0.0, f64::max);
+    let least = places.iter().map(units).fold(2000.0, f64::min);
+    assert!(most > 1140.0 && least < 860.0, "{least} to {most}");
+    for step in places.windows(2) {
+        let pace = (units(&step[1]) - units(&step[0])).abs();
+        assert!(pace <= 15.0, "{pace} units in a frame");
+    }
+    assert!(
+        places
+            .iter()
+            .all(|place| place.x == HOME.x && place.z == HOME.z)
+    );
+    assert_eq!(places.last(), Some(&HOME));
+    assert!(!machine.is_busy());
+}
+
+#[test]
+fn a_wave_stays_inside_the_area_and_is_none_with_the_pen_down() {
+    let mut machine = arm();
+    machine.take(A, &line(500, 10, 1000));
+    run(&mut machine, 0, 2000);
+    machine.take(Client::HOUSE, &Errand::Wave);
+    for frame in 201..=281 {
+        let place = machine.tick(Micros::new(frame * 10_000)).position;
+        assert!(contains(place.x, place.y), "{place:?}");
+    }
+    machine.take(A, &line(1000, 1000, 0));
+    run(&mut machine, 2820, 6000);
+    machine.take(Client::HOUSE, &Errand::Wave);
+    assert!(!machine.is_busy());
+}
+
+#[test]
+fn a_move_sent_during_a_wave_waits_for_its_end() {
+    let mut machine = arm();
+    machine.take(Client::HOUSE, &Errand::Wave);
+    assert_eq!(machine.take(A, &line(1000, 900, 0)), None);
+    run(&mut machine, 0, 790);
+    assert_eq!(machine.next_report(), None);
+    run(&mut machine, 800, 800);
+    assert_eq!(machine.next_report(), Some((A, moving(1000, 900, 0))));
 }

@@ -6,11 +6,11 @@ mod transform;
 mod units;
 
 pub use area::{MAX_RADIUS, closest, contains, line_leaves};
-pub use stepping::{DEFAULT_STEPS, STEP_TIME, StepRange, StepSize, Steps};
+pub use stepping::{DEFAULT_STEPS, STEP_TIME, StepRange, StepSize, Steps, WAVE};
 pub use transform::{MAX_COORDINATE, MAX_SCALE, Transform};
 pub use units::{
     Coordinate, HOME, Microdegrees, Micros, PEN_DOWN, PEN_DOWN_BELOW, PEN_UP, Position, PulseWidth,
     WideCoordinate,
 };
 
-pub(crate) use stepping::{Line, Rapid, hold};
+pub(crate) use stepping::{Line, Rapid, Wave, hold};

@@ -279,6 +279,53 @@ impl Rapid {
     }
 }
 
+/// How long a little wave takes.
+pub const WAVE: Micros = Wave::DURATION;
+
+/// A little wave: to the left, to the right and back, twice, at the pace of a move with the pen up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wave {
+    at: Position,
+}
+
+impl Wave {
+    /// From the middle to one side, in microseconds.
+    const SWING: u32 = 100_000;
+    /// 1/65536 units a microsecond: 15 units a step, 7.5 mm to each side.
+    const PACE: i32 = 98;
+    /// Four swings to and fro, twice.
+    pub(crate) const DURATION: Micros = Micros::new(8 * Self::SWING as u64);
+
+    /// Around a place.
+    pub(crate) const fn new(at: Position) -> Self {
+        Self { at }
+    }
+
+    pub(crate) const fn end(&self) -> Position {
+        self.at
+    }
+
+    fn aside(elapsed: u32) -> Coordinate {
+        let phase = elapsed % (4 * Self::SWING);
+        let swung = match phase / Self::SWING {
+            0 => phase.cast_signed(),
+            1 | 2 => (2 * Self::SWING).cast_signed() - phase.cast_signed(),
+            _ => phase.cast_signed() - (4 * Self::SWING).cast_signed(),
+        };
+        Coordinate::from_bits(swung * Self::PACE)
+    }
+
+    /// The set-point after `elapsed` microseconds; where it would leave the area it is held, which is
+    /// no fault of a wave.
+    pub(crate) fn at(&self, elapsed: u32) -> (Position, bool) {
+        let swung = Position {
+            y: self.at.y + Self::aside(elapsed),
+            ..self.at
+        };
+        (hold(swung).0, false)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -209,6 +209,11 @@ impl Micros {
         Self(micros)
     }
 
+    /// From milliseconds.
+    pub const fn from_millis(millis: u32) -> Self {
+        Self(millis as u64 * 1_000)
+    }
+
     /// From seconds.
     pub const fn from_secs(secs: u32) -> Self {
         Self(secs as u64 * 1_000_000)

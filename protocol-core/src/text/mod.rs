@@ -7,4 +7,4 @@ mod words;
 
 pub use decimal::{Decimal, OutOfRange};
 pub use lines::{LineBuffer, MAX_LINE, TooLong};
-pub use words::{MAX_EXCERPT, Text, WordError, Words, excerpt};
+pub use words::{MAX_EXCERPT, Text, WordError, Words, excerpt, excerpt_of_bytes};

@@ -7,7 +7,7 @@
 
 use super::decimal::{Decimal, OutOfRange};
 use core::fmt;
-use heapless::String;
+use heapless::Vec;
 
 /// What is wrong with the form of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,22 +32,22 @@ pub enum WordError<'a> {
     Value(char, &'a str),
 }
 
-/// The text value of a parameter, quotes not yet taken off.
+/// The text value of a parameter, quotes not yet taken off: bytes, because names of networks are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Text<'a> {
-    raw: &'a str,
+    raw: &'a [u8],
     quoted: bool,
 }
 
 impl<'a> Text<'a> {
     /// The value itself, doubled quotes made single; `None` when it is longer than `N` bytes.
-    pub fn unescape<const N: usize>(&self) -> Option<String<N>> {
-        let mut value = String::new();
-        let mut characters = self.raw.chars();
-        while let Some(character) = characters.next() {
-            value.push(character).ok()?;
-            if self.quoted && character == '"' {
-                characters.next();
+    pub fn unescape<const N: usize>(&self) -> Option<Vec<u8, N>> {
+        let mut value = Vec::new();
+        let mut bytes = self.raw.iter();
+        while let Some(&byte) = bytes.next() {
+            value.push(byte).ok()?;
+            if self.quoted && byte == b'"' {
+                bytes.next();
             }
         }
         Some(value)
@@ -55,11 +55,11 @@ impl<'a> Text<'a> {
 
     /// Whether the value is `word`, in any letter case.
     pub fn is(&self, word: &str) -> bool {
-        self.raw.eq_ignore_ascii_case(word)
+        self.raw.eq_ignore_ascii_case(word.as_bytes())
     }
 
     /// The value as it was written, for messages.
-    pub fn raw(&self) -> &'a str {
+    pub fn raw(&self) -> &'a [u8] {
         self.raw
     }
 }
@@ -162,7 +162,7 @@ impl<'a> Words<'a> {
     /// The text after `letter`, quoted or up to the next blank or comment.
     pub fn text(&mut self, letter: char) -> Result<Text<'a>, WordError<'a>> {
         let [b'"', inner @ ..] = self.rest else {
-            let raw = token(self.rest).ok_or(WordError::NotUtf8)?;
+            let raw = token_bytes(self.rest);
             if raw.is_empty() {
                 return Err(WordError::NoValue(letter));
             }
@@ -174,7 +174,6 @@ impl<'a> Words<'a> {
             if *byte == b'"' && bytes.next_if(|(_, next)| **next == b'"').is_none() {
                 let (raw, rest) = inner.split_at(at);
                 self.rest = rest.get(1..).unwrap_or_default();
-                let raw = str::from_utf8(raw).map_err(|_| WordError::NotUtf8)?;
                 return Ok(Text { raw, quoted: true });
             }
         }
@@ -270,11 +269,13 @@ fn after_comments(rest: &[u8]) -> Result<&[u8], WordError<'_>> {
 /// What comes up to the next blank or comment, `None` if it is not UTF-8.
 #[cold]
 fn token(rest: &[u8]) -> Option<&str> {
-    let end = rest
-        .iter()
-        .position(|&byte| separates(byte))
-        .unwrap_or(rest.len());
-    str::from_utf8(rest.get(..end)?).ok()
+    str::from_utf8(token_bytes(rest)).ok()
+}
+
+#[cold]
+fn token_bytes(rest: &[u8]) -> &[u8] {
+    let end = rest.iter().position(|&byte| separates(byte));
+    end.and_then(|end| rest.get(..end)).unwrap_or(rest)
 }
 
 /// Digits at the front of `text`: their value, which is right for up to [`MAX_SHORT_DIGITS`], how many
@@ -318,11 +319,20 @@ pub const MAX_EXCERPT: usize = 24;
 /// A text as a message may repeat it: shortened to `most` characters, and without those that would end
 /// the quoted message or the reply.
 pub fn excerpt(text: &str, most: usize) -> impl fmt::Display + '_ {
-    struct Excerpt<'a>(&'a str, usize);
+    excerpt_of_bytes(text.as_bytes(), most)
+}
+
+/// The same of bytes: what is not UTF-8 becomes a question mark.
+pub fn excerpt_of_bytes(text: &[u8], most: usize) -> impl fmt::Display + '_ {
+    struct Excerpt<'a>(&'a [u8], usize);
     impl fmt::Display for Excerpt<'_> {
         fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
             use fmt::Write;
-            for (count, character) in self.0.chars().enumerate() {
+            let characters = self.0.utf8_chunks().flat_map(|chunk| {
+                let broken = (!chunk.invalid().is_empty()).then_some('?');
+                chunk.valid().chars().chain(broken)
+            });
+            for (count, character) in characters.enumerate() {
                 if count == self.1 {
                     return out.write_str("...");
                 }
@@ -444,7 +454,11 @@ mod tests {
             ("*;all", "*"),
         ] {
             let text = Words::new(value.as_bytes()).text('S').unwrap();
-            assert_eq!(text.unescape::<64>().unwrap(), meaning, "{value}");
+            assert_eq!(
+                text.unescape::<64>().unwrap(),
+                meaning.as_bytes(),
+                "{value}"
+            );
         }
         assert_eq!(
             Words::new(b"\"open").text('S'),
@@ -462,11 +476,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn quoting_and_unquoting_is_the_identity(value in "\\PC{0,32}") {
-            let written = format!("\"{}\"", value.replace('"', "\"\""));
-            let text = Words::new(written.as_bytes()).text('S').unwrap();
+        fn quoting_and_unquoting_is_the_identity(value: std::vec::Vec<u8>) {
+            let doubled = value.iter().flat_map(|&byte| match byte {
+                b'"' => [b'"', b'"'].into_iter().take(2),
+                other => [other, other].into_iter().take(1),
+            });
+            let written: std::vec::Vec<u8> =
+                [b'"'].into_iter().chain(doubled).chain([b'"']).collect();
+            let text = Words::new(&written).text('S').unwrap();
             let read = text.unescape::<256>().unwrap();
-            prop_assert_eq!(read.as_str(), value);
+            prop_assert_eq!(&read[..], &value[..]);
         }
 
         #[test]

@@ -216,6 +216,8 @@ fn outcome(reason: DisconnectReason) -> Joined {
     use DisconnectReason as Why;
     match reason {
         Why::NoAccessPointFound | Why::NoAccessPointFoundInRssiThreshold => Joined::NotFound,
+        Why::NoAccessPointFoundWithCompatibleSecurity
+        | Why::NoAccessPointFoundInAuthmodeThreshold => Joined::Unfit,
         Why::FourWayHandshakeTimeout
         | Why::HandshakeTimeout
         | Why::AuthenticationFailed
@@ -245,8 +247,6 @@ fn number(reason: DisconnectReason) -> u16 {
         Why::AssociationFailed => 203,
         Why::HandshakeTimeout => 204,
         Why::ConnectionFailed => 205,
-        Why::NoAccessPointFoundWithCompatibleSecurity => 210,
-        Why::NoAccessPointFoundInAuthmodeThreshold => 211,
         Why::NoAccessPointFoundInRssiThreshold => 212,
         _ => 1,
     }

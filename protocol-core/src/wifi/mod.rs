@@ -1,6 +1,15 @@
 //! Networks as the firmware speaks of them: names, passwords, what is heard, how joining ended.
 
+mod policy;
+
+pub use policy::{Effect, Event, Job, PAUSES, Phase, Policy, Status};
+
 use heapless::Vec;
+
+/// Name of the machine's own, open network (`reference/line-us.md`, section 6).
+pub const SETUP_SSID: &str = "Line-us-Setup";
+/// Networks that are listened to at once; of more, the weakest are not heard.
+pub const MAX_HEARD: usize = 16;
 
 /// Longest network name in bytes (IEEE 802.11).
 pub const MAX_SSID: usize = 32;
@@ -20,6 +29,11 @@ impl Ssid {
             return None;
         }
         Vec::from_slice(name).ok().map(Self)
+    }
+
+    /// The name of the machine's own network, where nobody else has it.
+    pub fn setup() -> Self {
+        Self(SETUP_SSID.bytes().collect())
     }
 
     /// The name as it is on the air.
@@ -188,6 +202,9 @@ pub enum Joined {
     NotFound,
     /// The network is there and does not take the password.
     WrongPassword,
+    /// The network is there, and its protection is another one than this machine can have with it: WPA3
+    /// alone where the radio does not speak that, or no password where one is remembered.
+    Unfit,
     /// Anything else, with the radio's own reason: IEEE 802.11 reason codes, 200 and up are the
     /// driver's, 0 if there is none.
     Failed(u16),
