@@ -72,7 +72,10 @@ impl House {
 
     /// Waves before the first client after power-on is greeted, and is home again.
     async fn greet_first_client(&self) {
-        if !self.greeted.swap(true, Ordering::Relaxed) && self.wave() {
+        // Workers share one executor: nobody comes in between.
+        let greeted = self.greeted.load(Ordering::Relaxed);
+        self.greeted.store(true, Ordering::Relaxed);
+        if !greeted && self.wave() {
             Timer::after_micros(WAVE.get()).await;
         }
     }
