@@ -121,7 +121,10 @@ fn every_example_moves_the_servos_exactly_as_on_the_desktop() {
     }
     assert!(names.len() >= 4, "{names:?}");
     for file in names {
-        let mut machine = Machine::boot(Time::Virtual);
+        let machine = Machine::boot(Time::Virtual);
+        // What follows is to be the example alone.
+        assert_eq!(machine.client().say("M291 S2"), "ok ");
+        let mut machine = machine.power_cycle();
         let mut client = machine.client();
         let text = fs::read_to_string(&file).unwrap();
         let lines: Vec<&str> = text
