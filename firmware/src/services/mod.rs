@@ -12,6 +12,7 @@ use arm::Arm;
 use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_time::{Duration, Instant};
 use network::Wifi;
 use panel::Panel;
 use protocol_core::lineus::Identity;
@@ -34,6 +35,7 @@ pub struct House {
     /// How it is.
     pub vitals: Vitals,
     name: Mutex<CriticalSectionRawMutex, RefCell<MachineName>>,
+    started: Instant,
 }
 
 impl House {
@@ -47,7 +49,13 @@ impl House {
             identity,
             vitals,
             name: Mutex::new(RefCell::new(settings.name)),
+            started: Instant::now(),
         }
+    }
+
+    /// Time since the firmware started.
+    pub fn uptime(&self) -> Duration {
+        self.started.elapsed()
     }
 
     /// The machine's name.
