@@ -74,7 +74,7 @@ pub enum Expectation {
     Opens(Ssid),
     ClosesItsNetwork,
     Tries(Ssid, Outcome),
-    KeepsTrying(Ssid),
+    MayTry(Ssid),
     TriesNothing(Duration),
     Remembers(Remembered),
     PowerIsOff,
@@ -327,8 +327,8 @@ fn machine(words: &mut Words<'_>) -> Result<Expectation, String> {
         Expectation::Tries(ssid(words)?, Outcome::Refused)
     } else if words.eat("fails to join") {
         Expectation::Tries(ssid(words)?, Outcome::Failed)
-    } else if words.eat("keeps trying") {
-        Expectation::KeepsTrying(ssid(words)?)
+    } else if words.eat("may try") {
+        Expectation::MayTry(ssid(words)?)
     } else if words.eat("tries nothing") {
         Expectation::TriesNothing(stay(words)?)
     } else if words.eat("remembers") {

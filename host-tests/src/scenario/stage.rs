@@ -3,7 +3,8 @@
 use super::client::Client;
 use super::command::{Action, ClientAction, Memory, Network};
 use crate::scripted::Board;
-use crate::scripted::light::Pattern;
+use crate::scripted::journal::note;
+use crate::scripted::light::{Hue, Pattern};
 use crate::scripted::radio::shown;
 use embassy_time::{Duration, Instant};
 use firmware::boards::scripted_radio::OnAir;
@@ -31,11 +32,13 @@ pub struct Stage {
     pub computer: Option<Ssid>,
     /// Networks of the script, in the air or not.
     networks: Vec<OnAir>,
+    /// What the light has shown last.
+    seen: Pattern,
     /// The last pattern of the light that was expected, since power came.
     pub looked: Option<Pattern>,
     /// When power came last.
     pub powered: Instant,
-    /// Attempts to join it are expected, however many there are.
+    /// Attempts to join it need not be expected one by one.
     pub tries_allowed: Option<Ssid>,
     /// How much the arm had done when the script did something last.
     pub acted: usize,
@@ -51,11 +54,22 @@ impl Stage {
             clients: Vec::new(),
             computer: None,
             networks: Vec::new(),
+            seen: Pattern::Steady(Hue::DARK),
             looked: None,
             powered: Instant::MIN,
             tries_allowed: None,
             acted: 0,
             passed: 0,
+        }
+    }
+
+    /// Notes what the light shows, when that has become something else.
+    fn look(&mut self) {
+        if let Some(pattern) = self.board.light.pattern()
+            && self.seen != pattern
+        {
+            self.seen = pattern;
+            note(format_args!("    light: {pattern}"));
         }
     }
 
@@ -85,6 +99,7 @@ impl Stage {
         let until = Instant::now() + time;
         loop {
             self.settle();
+            self.look();
             if let Some(offence) = self.board.power.offence() {
                 return Err(offence);
             }

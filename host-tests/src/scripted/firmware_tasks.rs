@@ -121,11 +121,9 @@ impl Devices {
 
 /// What a start would find in these cells, which stay as they are.
 pub fn remembered(cells: &Cells) -> Settings {
-    let power = Power::default();
-    power.switch(true);
     let flash = Flash {
         cells: Rc::new(RefCell::new(cells.clone())),
-        power,
+        power: Power::present(),
         moving: Rc::new(|| false),
     };
     embassy_futures::block_on(memory(flash).load())

@@ -1,6 +1,5 @@
 //! The light: what it showed when, and what a person would say it shows.
 
-use super::journal::note;
 use super::power::Power;
 use embassy_time::{Duration, Instant};
 use firmware::board::{self, Colour};
@@ -109,7 +108,6 @@ impl LightRecord {
         let mut changes = self.0.borrow_mut();
         if changes.last().is_none_or(|(_, last)| *last != hue) {
             changes.push((Instant::now(), hue));
-            note(format_args!("    light: {hue}"));
         }
     }
 

@@ -15,6 +15,13 @@ struct State {
 }
 
 impl Power {
+    /// There is power, and there was before.
+    pub fn present() -> Self {
+        let power = Self::default();
+        power.0.on.set(true);
+        power
+    }
+
     /// Whether there is power.
     pub fn is_on(&self) -> bool {
         self.0.on.get()

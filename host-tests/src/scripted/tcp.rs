@@ -43,7 +43,9 @@ impl Port {
     /// Nobody waits any more, and who was waiting for somebody is forgotten.
     pub fn power_off(&self) {
         for (_, wire) in self.connecting.take() {
-            wire.borrow_mut().machine_forgets = true;
+            let mut wire = wire.borrow_mut();
+            wire.machine_forgets = true;
+            wire.power_failed = true;
         }
         self.wakers.take();
     }
@@ -123,10 +125,7 @@ impl Drop for Socket {
         let mut wire = self.0.wire.borrow_mut();
         wire.machine_forgets = true;
         wire.outgoing.clear();
-        if !self.0.power.is_on() {
-            // The client has not been told of any end.
-            wire.machine_finishes = false;
-        }
+        wire.power_failed = !self.0.power.is_on();
     }
 }
 

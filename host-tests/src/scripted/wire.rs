@@ -19,7 +19,7 @@ pub enum End {
     Closed,
     /// The other side reset it.
     Reset,
-    /// Nothing was heard of the other side for too long.
+    /// Nothing was heard of the other side for too long, or it has been without power.
     Lost,
 }
 
@@ -44,6 +44,8 @@ pub struct Wire {
     pub machine_finishes: bool,
     /// The machine has thrown its end away.
     pub machine_forgets: bool,
+    /// It did so because its power failed.
+    pub power_failed: bool,
     /// How it ended for the machine; what arrived before can still be read.
     pub machine_sees: Option<End>,
     /// How it ended for the client.
@@ -94,10 +96,10 @@ impl Wire {
         let mut woken = false;
         if self.machine_forgets {
             // Whatever the client's system sends is answered with a reset.
-            let end = if self.machine_finishes {
-                End::Closed
-            } else {
-                End::Reset
+            let end = match (self.power_failed, self.machine_finishes) {
+                (true, _) => End::Lost,
+                (false, true) => End::Closed,
+                (false, false) => End::Reset,
             };
             self.client_sees.get_or_insert(end);
             return Vec::new();
