@@ -5,3 +5,5 @@
 pub mod bench;
 pub mod desktop;
 pub mod model;
+pub mod scenario;
+pub mod scripted;

@@ -4,16 +4,14 @@ use clap::{Args, Parser, Subcommand};
 use core::net::SocketAddr;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::flash::{self, FileFlash};
 use firmware::boards::desktop::net::Listener;
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
-use firmware::boards::desktop::{IDENTITY, NoAddress, OWN_NETWORK, VITALS, own_network};
-use firmware::boards::scripted_radio::ScriptedRadio;
+use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS, own_network};
+use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{Server, serve};
@@ -196,8 +194,14 @@ async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
 /// There is no radio here: the network policy runs on one that hears the computer's own network alone.
 #[embassy_executor::task]
 async fn wifi(house: &'static House) {
-    static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    let radio = ScriptedRadio::new(&[OWN_NETWORK], &CUT);
+    static AIR: Air = Air::new(Pace::INSTANT);
+    let own = own_network();
+    AIR.put(OnAir {
+        ssid: own.ssid,
+        password: own.password,
+        signal_dbm: -30,
+    });
+    let radio = ScriptedRadio::new(&AIR);
     network::run(house, radio, NoAddress).await;
 }
 

@@ -6,12 +6,10 @@ use edge_nal::TcpBind;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_futures::select::{Either, select};
 use embassy_net::{Config, Runner, Stack, StackResources};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use firmware::boards::SETTINGS;
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
-use firmware::boards::scripted_radio::{OnAir, ScriptedRadio};
+use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::boards::virt::flash::Flash;
 use firmware::boards::virt::net::VirtNet;
 use firmware::boards::virt::world::button::Button;
@@ -35,13 +33,6 @@ const CONNECTIONS: usize = MAX_CLIENTS + 1;
 const BUFFER: usize = 2048;
 
 type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
-
-/// What the scripted radio hears.
-const AIR: &[OnAir] = &[OnAir {
-    ssid: "quill-test",
-    password: Some("correct horse"),
-    signal_dbm: -50,
-}];
 
 /// Never returns.
 #[riscv_rt::entry]
@@ -167,8 +158,11 @@ async fn button(house: &'static House) {
 
 #[embassy_executor::task]
 async fn wifi(house: &'static House) {
-    static CUT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    network::run(house, ScriptedRadio::new(AIR, &CUT), Wired).await;
+    static AIR: Air = Air::new(Pace::INSTANT);
+    if let Some(network) = OnAir::new(b"quill-test", Some(b"correct horse"), -50) {
+        AIR.put(network);
+    }
+    network::run(house, ScriptedRadio::new(&AIR), Wired).await;
 }
 
 #[embassy_executor::task]

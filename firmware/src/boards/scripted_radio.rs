@@ -1,108 +1,264 @@
 //! A radio without air: which networks there are, and what becomes of them, is told by a script.
+//!
+//! It behaves as the chips' radio does: the machine's own network may stay open while another is joined,
+//! opening it drops the joined one, and a joined network that goes away or changes its password is lost.
 
 use crate::board::{Radio, RadioFault};
+use core::cell::RefCell;
+use core::ops::Deref;
+use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Timer};
 use heapless::Vec;
-use protocol_core::wifi::{Heard, Joined, Network, Security, Ssid};
+use protocol_core::wifi::{Heard, Joined, Network, Password, Security, Ssid};
+
+/// Networks that can be in the air at once; more are not heard.
+pub const MAX_ON_AIR: usize = 16;
 
 /// A network of the script.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OnAir {
-    /// Its name, as text.
-    pub ssid: &'static str,
+    /// Its name.
+    pub ssid: Ssid,
     /// Its password; none for an open network.
-    pub password: Option<&'static str>,
+    pub password: Option<Password>,
     /// Its strength.
     pub signal_dbm: i8,
 }
 
-/// The radio.
-pub struct ScriptedRadio {
-    networks: &'static [OnAir],
-    cut: &'static Signal<CriticalSectionRawMutex, ()>,
-    joined: bool,
-}
-
-impl ScriptedRadio {
-    /// Hears `networks`, strongest first; `cut` ends the joined one.
-    pub const fn new(
-        networks: &'static [OnAir],
-        cut: &'static Signal<CriticalSectionRawMutex, ()>,
-    ) -> Self {
-        Self {
-            networks,
-            cut,
-            joined: false,
-        }
+impl OnAir {
+    /// A network; `None` if name or password have a length that cannot be.
+    pub fn new(ssid: &[u8], password: Option<&[u8]>, signal_dbm: i8) -> Option<Self> {
+        let password = match password {
+            Some(phrase) => Some(Password::new(phrase)?),
+            None => None,
+        };
+        Some(Self {
+            ssid: Ssid::new(ssid)?,
+            password,
+            signal_dbm,
+        })
     }
 }
 
-impl Radio for ScriptedRadio {
+/// How long the radio takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pace {
+    /// For listening on all channels.
+    pub scan: Duration,
+    /// For joining a network, or failing to.
+    pub join: Duration,
+}
+
+impl Pace {
+    /// No time at all.
+    pub const INSTANT: Self = Self {
+        scan: Duration::MIN,
+        join: Duration::MIN,
+    };
+    /// About as long as a chip's.
+    pub const LIFELIKE: Self = Self {
+        scan: Duration::from_millis(1500),
+        join: Duration::from_secs(2),
+    };
+}
+
+/// What is in the air around the machine, shared by script and radio.
+pub struct Air {
+    state: Mutex<CriticalSectionRawMutex, RefCell<State>>,
+    /// The joined network may be lost.
+    changed: Signal<CriticalSectionRawMutex, ()>,
+}
+
+struct State {
+    networks: Vec<OnAir, MAX_ON_AIR>,
+    pace: Pace,
+    faulty: bool,
+    joined: Option<Ssid>,
+    own: Option<Ssid>,
+}
+
+impl Air {
+    /// Air without networks.
+    pub const fn new(pace: Pace) -> Self {
+        Self {
+            state: Mutex::new(RefCell::new(State {
+                networks: Vec::new(),
+                pace,
+                faulty: false,
+                joined: None,
+                own: None,
+            })),
+            changed: Signal::new(),
+        }
+    }
+
+    fn with<T>(&self, f: impl FnOnce(&mut State) -> T) -> T {
+        self.state.lock(|state| f(&mut state.borrow_mut()))
+    }
+
+    /// Puts a network into the air, in the place of one of the same name if there is one.
+    pub fn put(&self, network: OnAir) {
+        let old = self.find(&network.ssid);
+        if old.is_some_and(|old| old.password != network.password) {
+            self.remove(&network.ssid);
+        }
+        self.with(|state| {
+            state.networks.retain(|old| old.ssid != network.ssid);
+            // Strongest first, as a scan gives them. One that does not fit is not heard.
+            let weaker = |other: &OnAir| other.signal_dbm < network.signal_dbm;
+            let place = state.networks.iter().position(weaker);
+            let place = place.unwrap_or(state.networks.len());
+            let _ = state.networks.insert(place, network);
+        });
+    }
+
+    /// Takes a network out of the air; who had joined it loses it.
+    pub fn remove(&self, ssid: &Ssid) {
+        self.with(|state| {
+            state.networks.retain(|network| network.ssid != *ssid);
+            if state.joined.as_ref() == Some(ssid) {
+                state.joined = None;
+            }
+        });
+        self.changed.signal(());
+    }
+
+    /// The network of that name.
+    pub fn find(&self, ssid: &Ssid) -> Option<OnAir> {
+        self.with(|state| {
+            let mut networks = state.networks.iter();
+            networks.find(|network| network.ssid == *ssid).cloned()
+        })
+    }
+
+    /// Breaks the link to the joined network, which stays in the air.
+    pub fn cut(&self) {
+        self.with(|state| state.joined = None);
+        self.changed.signal(());
+    }
+
+    /// Lets the radio fail from now on, or work again.
+    pub fn set_fault(&self, faulty: bool) {
+        self.with(|state| state.faulty = faulty);
+    }
+
+    /// Lets the radio take longer or shorter from now on.
+    pub fn set_pace(&self, pace: Pace) {
+        self.with(|state| state.pace = pace);
+    }
+
+    /// How long the radio takes now.
+    pub fn pace(&self) -> Pace {
+        self.with(|state| state.pace)
+    }
+
+    /// The network that the machine has joined.
+    pub fn joined(&self) -> Option<Ssid> {
+        self.with(|state| state.joined.clone())
+    }
+
+    /// The machine's own network, if it is open.
+    pub fn own(&self) -> Option<Ssid> {
+        self.with(|state| state.own.clone())
+    }
+}
+
+/// The radio in the air of `A`; one at a time.
+pub struct ScriptedRadio<A: Deref<Target = Air>> {
+    air: A,
+}
+
+impl<A: Deref<Target = Air>> ScriptedRadio<A> {
+    /// A radio that has joined nothing.
+    pub const fn new(air: A) -> Self {
+        Self { air }
+    }
+}
+
+impl<A: Deref<Target = Air>> Drop for ScriptedRadio<A> {
+    /// A radio without power.
+    fn drop(&mut self) {
+        self.air.with(|state| {
+            state.joined = None;
+            state.own = None;
+        });
+    }
+}
+
+impl<A: Deref<Target = Air>> Radio for ScriptedRadio<A> {
     async fn scan<const N: usize>(&mut self, heard: &mut Vec<Heard, N>) -> Result<(), RadioFault> {
         heard.clear();
-        for network in self.networks {
-            let Some(ssid) = Ssid::new(network.ssid.as_bytes()) else {
-                continue;
-            };
-            let security = match network.password {
-                Some(_) => Security::Password,
-                None => Security::Open,
-            };
-            let signal_dbm = network.signal_dbm;
-            if heard
-                .push(Heard {
-                    ssid,
-                    security,
-                    signal_dbm,
-                })
-                .is_err()
-            {
-                break;
+        Timer::after(self.air.pace().scan).await;
+        self.air.with(|state| {
+            if state.faulty {
+                return Err(RadioFault);
             }
-        }
-        Ok(())
+            for network in &state.networks {
+                let security = match network.password {
+                    Some(_) => Security::Password,
+                    None => Security::Open,
+                };
+                let entry = Heard {
+                    ssid: network.ssid.clone(),
+                    security,
+                    signal_dbm: network.signal_dbm,
+                };
+                if heard.push(entry).is_err() {
+                    break;
+                }
+            }
+            Ok(())
+        })
     }
 
     async fn join(&mut self, network: &Network) -> Joined {
-        let known = |on_air: &&OnAir| on_air.ssid.as_bytes() == network.ssid.as_bytes();
-        let outcome = match self.networks.iter().find(known) {
-            None => Joined::NotFound,
-            Some(on_air) => {
-                let given = network
-                    .password
-                    .as_ref()
-                    .map(|password| password.as_bytes());
-                match given == on_air.password.map(str::as_bytes) {
-                    true => Joined::Yes,
-                    false => Joined::WrongPassword,
+        self.leave().await;
+        Timer::after(self.air.pace().join).await;
+        self.air.with(|state| {
+            if state.faulty {
+                return Joined::Failed(0);
+            }
+            let mut networks = state.networks.iter();
+            match networks.find(|on_air| on_air.ssid == network.ssid) {
+                None => Joined::NotFound,
+                Some(on_air) if on_air.password != network.password => Joined::WrongPassword,
+                Some(_) => {
+                    state.joined = Some(network.ssid.clone());
+                    Joined::Yes
                 }
             }
-        };
-        self.joined = outcome == Joined::Yes;
-        self.cut.reset();
-        outcome
+        })
     }
 
     async fn leave(&mut self) {
-        self.joined = false;
+        self.air.with(|state| state.joined = None);
     }
 
-    async fn open_access_point(&mut self, _: &Network) -> Result<(), RadioFault> {
-        self.joined = false;
-        Ok(())
+    async fn open_access_point(&mut self, network: &Network) -> Result<(), RadioFault> {
+        self.air.with(|state| {
+            state.joined = None;
+            if state.faulty {
+                return Err(RadioFault);
+            }
+            state.own = Some(network.ssid.clone());
+            Ok(())
+        })
     }
 
     async fn close_access_point(&mut self) -> Result<(), RadioFault> {
+        self.air.with(|state| state.own = None);
         Ok(())
     }
 
     fn is_joined(&self) -> bool {
-        self.joined
+        self.air.joined().is_some()
     }
 
     async fn lost(&mut self) {
-        self.cut.wait().await;
-        self.joined = false;
+        while self.is_joined() {
+            self.air.changed.wait().await;
+        }
     }
 }

@@ -13,7 +13,7 @@ use embassy_futures::select::{Either, select};
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Instant, Timer, with_timeout};
+use embassy_time::{Duration, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
 use protocol_core::lineus::{Diagnostics, MAX_REPLY, Refusal, Reply, Request, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
@@ -200,7 +200,7 @@ fn diagnose(reply: &mut Reply, house: &House) {
     reply.diagnostics(&Diagnostics {
         name: &house.name(),
         identity: house.identity,
-        uptime: Micros::new(Instant::now().as_micros()),
+        uptime: Micros::new(house.uptime().as_micros()),
         position,
         calibration,
         wifi: &house.wifi.status(),

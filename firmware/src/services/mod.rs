@@ -13,7 +13,7 @@ use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_time::Timer;
+use embassy_time::{Duration, Instant, Timer};
 use network::Wifi;
 use panel::Panel;
 use protocol_core::lineus::Identity;
@@ -38,6 +38,7 @@ pub struct House {
     pub vitals: Vitals,
     settings: Mutex<CriticalSectionRawMutex, RefCell<Settings>>,
     greeted: AtomicBool,
+    started: Instant,
 }
 
 impl House {
@@ -52,7 +53,13 @@ impl House {
             vitals,
             settings: Mutex::new(RefCell::new(settings)),
             greeted: AtomicBool::new(false),
+            started: Instant::now(),
         }
+    }
+
+    /// Time since the firmware started.
+    pub fn uptime(&self) -> Duration {
+        self.started.elapsed()
     }
 
     /// Something short with the settings in force.

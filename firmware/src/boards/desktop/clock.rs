@@ -4,11 +4,16 @@
 //! for the next alarm; where time is virtual, the executor jumps to it instead, as soon as it has
 //! nothing else to do. Jumps are taken only while the arm moves: at rest nothing is to be hurried, and
 //! the time that clients see stays near the wall's.
+//!
+//! A test may take the time of its thread into its own hands ([`HandTime`]): it stands still then, unless
+//! it is moved.
 
 use core::task::Waker;
 use embassy_executor::{Executor, Spawner};
 use embassy_time_driver::Driver;
 use embassy_time_queue_utils::Queue;
+use std::cell::RefCell;
+use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -116,10 +121,13 @@ impl Clock {
 
 impl Driver for Clock {
     fn now(&self) -> u64 {
-        self.lock().now()
+        HandTime::with(|hand| hand.now).unwrap_or_else(|| self.lock().now())
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
+        if HandTime::with(|hand| hand.alarms.schedule_wake(at, waker)).is_some() {
+            return;
+        }
         if self.lock().alarms.schedule_wake(at, waker) {
             self.earlier.notify_one();
         }
@@ -147,4 +155,57 @@ pub fn run(speed: Speed, spawn: impl FnOnce(Spawner), mut done: impl FnMut() -> 
         CLOCK.jump();
         done()
     });
+}
+
+struct Hand {
+    now: u64,
+    alarms: Queue,
+}
+
+thread_local! {
+    static HAND: RefCell<Option<Hand>> = const { RefCell::new(None) };
+}
+
+/// As long as this lives, time in this thread begins at 0 and is what it is told to be.
+#[derive(Debug)]
+pub struct HandTime {
+    /// Of this thread, so it stays there.
+    thread: PhantomData<*const ()>,
+}
+
+impl HandTime {
+    /// Takes the time of this thread into hand.
+    pub fn take() -> Self {
+        HAND.set(Some(Hand {
+            now: 0,
+            alarms: Queue::new(),
+        }));
+        Self {
+            thread: PhantomData,
+        }
+    }
+
+    fn with<T>(f: impl FnOnce(&mut Hand) -> T) -> Option<T> {
+        HAND.with_borrow_mut(|hand| hand.as_mut().map(f))
+    }
+
+    /// When the next alarm is due, after those that are due now have been rung.
+    pub fn next_alarm(&self) -> Option<embassy_time::Instant> {
+        let next = Self::with(|hand| hand.alarms.next_expiration(hand.now))?;
+        (next != u64::MAX).then(|| embassy_time::Instant::from_ticks(next))
+    }
+
+    /// Goes on to `time`, or stays where it is if that is past, and rings the alarms that are due.
+    pub fn go_on_to(&self, time: embassy_time::Instant) {
+        Self::with(|hand| {
+            hand.now = hand.now.max(time.as_ticks());
+            hand.alarms.next_expiration(hand.now)
+        });
+    }
+}
+
+impl Drop for HandTime {
+    fn drop(&mut self) {
+        HAND.set(None);
+    }
 }

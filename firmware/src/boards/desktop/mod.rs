@@ -9,7 +9,6 @@ pub mod net;
 pub mod recorder;
 
 use crate::board::{Address, Vitals};
-use crate::boards::scripted_radio::OnAir;
 use protocol_core::lineus::Identity;
 use protocol_core::wifi::{Network, Ssid};
 
@@ -26,20 +25,13 @@ pub const VITALS: Vitals = Vitals {
 };
 
 /// The network that a desktop is in, whatever it is: as if it were an open one.
-pub const OWN_NETWORK: OnAir = OnAir {
-    ssid: "this computer's",
-    password: None,
-    signal_dbm: -30,
-};
-
-/// The same to join.
 ///
 /// # Panics
 /// Never: the name is short enough.
 #[expect(clippy::expect_used, reason = "a constant of one to 32 bytes")]
 pub fn own_network() -> Network {
     Network {
-        ssid: Ssid::new(OWN_NETWORK.ssid.as_bytes()).expect("one to 32 bytes"),
+        ssid: Ssid::new(b"this computer's").expect("one to 32 bytes"),
         password: None,
     }
 }

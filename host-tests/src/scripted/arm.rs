@@ -1,0 +1,148 @@
+//! The servos: every set-point is looked at, and every place the nib has been is kept.
+
+use super::power::Power;
+use crate::model;
+use embassy_time::{Duration, Instant};
+use firmware::board;
+use protocol_core::machine::SetPoint;
+use protocol_core::motion::{Micros, Position};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// Where the arm is when it starts: x, y, z.
+pub const HOME: [f64; 3] = [1000.0; 3];
+/// The pen is down below this (`spec 1.0.4a, G94`).
+pub const PEN_DOWN_BELOW: f64 = 500.0;
+/// The longest way from home that still is a little wave, along each axis.
+const WAVE: f64 = 600.0;
+/// What rounding to 1/65536 of a unit may put a place outside by.
+const ROUNDING: f64 = 1.0 / 32.0;
+/// A servo's own limits, in microseconds (`reference/arm.md`).
+const PULSES: std::ops::RangeInclusive<f64> = 500.0..=2500.0;
+
+/// What the arm did: places with the time at which it came there.
+#[derive(Debug, Default)]
+pub struct ArmRecord(RefCell<Path>);
+
+#[derive(Debug, Default)]
+struct Path {
+    places: Vec<(Instant, [f64; 3])>,
+    moving: bool,
+    last_frame: Option<Instant>,
+}
+
+fn place(position: Position) -> [f64; 3] {
+    [position.x, position.y, position.z].map(|coordinate| coordinate.to_f64())
+}
+
+impl ArmRecord {
+    /// The power has gone: the arm stands still.
+    pub fn power_off(&self) {
+        let mut path = self.0.borrow_mut();
+        path.moving = false;
+        path.last_frame = None;
+    }
+
+    /// Where the nib is; home before the first set-point.
+    pub fn place(&self) -> [f64; 3] {
+        let path = self.0.borrow();
+        path.places.last().map_or(HOME, |(_, place)| *place)
+    }
+
+    /// Since when it is there.
+    pub fn there_since(&self) -> Instant {
+        let path = self.0.borrow();
+        path.places.last().map_or(Instant::MIN, |(at, _)| *at)
+    }
+
+    /// Whether a move is under way, by the last set-point.
+    pub fn is_moving(&self) -> bool {
+        self.0.borrow().moving
+    }
+
+    /// How many places there are, for [`Self::passed`] and [`Self::waved`].
+    pub fn length(&self) -> usize {
+        self.0.borrow().places.len()
+    }
+
+    /// Where in the record, from `since` on, the nib was at x, y and, if it is given, z.
+    pub fn passed(&self, since: usize, x: f64, y: f64, z: Option<f64>) -> Option<usize> {
+        let path = self.0.borrow();
+        let at = |a: f64, b: f64| (a - b).abs() <= ROUNDING;
+        let mut places = path.places.iter().skip(since);
+        let found = places.position(|(_, place)| {
+            at(place[0], x) && at(place[1], y) && z.is_none_or(|z| at(place[2], z))
+        });
+        found.map(|index| since + index)
+    }
+
+    /// The closest that the nib came to x, y since then.
+    pub fn closest(&self, since: usize, x: f64, y: f64) -> Option<[f64; 3]> {
+        let path = self.0.borrow();
+        let distance = |place: &[f64; 3]| (place[0] - x).hypot(place[1] - y);
+        let places = path.places.iter().skip(since).map(|(_, place)| *place);
+        places.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Whether a little motion near home, with the pen up, has brought the arm back home since then.
+    pub fn waved(&self, since: usize) -> bool {
+        let path = self.0.borrow();
+        let places = path.places.get(since..).unwrap_or_default();
+        let near = |place: &[f64; 3]| {
+            let axes = place.iter().zip(HOME);
+            place[2] >= PEN_DOWN_BELOW && axes.clone().all(|(a, home)| (a - home).abs() <= WAVE)
+        };
+        let went = places.iter().any(|(_, place)| *place != HOME);
+        let back = places.last().is_some_and(|(_, place)| *place == HOME);
+        went && back && !path.moving && places.iter().all(|(_, place)| near(place))
+    }
+}
+
+/// The servos of the board.
+pub struct Servos {
+    /// What they did.
+    pub record: Rc<ArmRecord>,
+    /// Without which they do nothing.
+    pub power: Power,
+    /// Time between two frames.
+    pub frame: Duration,
+}
+
+impl board::Servos for Servos {
+    fn write(&mut self, _: Micros, set_point: &SetPoint) {
+        if !self.power.is_on() {
+            return;
+        }
+        let now = Instant::now();
+        let mut path = self.record.0.borrow_mut();
+        if let Some(last) = path.last_frame.replace(now)
+            && now - last != self.frame
+        {
+            self.power.offend(format!(
+                "a servo frame comes {} us after the one before",
+                (now - last).as_micros()
+            ));
+        }
+        path.moving = set_point.moving;
+        let place = place(set_point.position);
+        if path.places.last().is_some_and(|(_, last)| *last == place) {
+            return;
+        }
+        path.places.push((now, place));
+        let [x, y, z] = place;
+        let (near_x, near_y) = model::closest(x, y);
+        if (near_x - x).hypot(near_y - y) > ROUNDING || !(0.0..=1000.0).contains(&z) {
+            self.power.offend(format!(
+                "the arm leaves its drawing area: {x:.2} {y:.2} {z:.2}"
+            ));
+        }
+        for pulse in set_point.pulses {
+            let unit = f64::from(protocol_core::motion::PulseWidth::PER_MICROSECOND);
+            let width = f64::from(pulse.get()) / unit;
+            if !PULSES.contains(&width) {
+                self.power
+                    .offend(format!("a servo gets a pulse of {width:.2} us"));
+            }
+        }
+    }
+}

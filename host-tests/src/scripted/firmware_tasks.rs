@@ -1,0 +1,126 @@
+//! The firmware's services on the board's devices: the only place that starts them.
+
+use super::arm::Servos;
+use super::button::Button;
+use super::flash::{Cells, Flash, SIZE};
+use super::light::Light;
+use super::power::Power;
+use super::radio::{RecordedAddress, RecordedRadio};
+use super::tcp::Acceptor;
+use super::{Board, FRAME};
+use firmware::board::Vitals;
+use firmware::services::House;
+use firmware::services::arm::TimedFrames;
+use firmware::services::line_us::Server;
+use firmware::services::storage::Memory;
+use firmware::services::{network, panel};
+use protocol_core::lineus::Identity;
+use protocol_core::machine::{ArmData, Client};
+use protocol_core::settings::Settings;
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// Its serial number is 123456.
+const IDENTITY: Identity = Identity {
+    mac: [0x02, 0x51, 0x75, 0x01, 0xe2, 0x40],
+};
+
+fn memory(flash: Flash) -> Memory<Flash> {
+    Memory::new(flash, 0..SIZE).expect("whole pages, at least two of them")
+}
+
+/// Starts everything, as the programs of the other boards do.
+pub fn start(board: &Board, reason: &'static str) {
+    let moving = {
+        let house = board.house.clone();
+        move || {
+            let house = house.borrow();
+            let house: Option<&Rc<House>> = house.as_ref();
+            house.is_some_and(|house| house.arm.with(|arm| arm.next_event().is_some()))
+        }
+    };
+    let flash = Flash {
+        cells: board.cells.clone(),
+        power: board.power.clone(),
+        moving: Rc::new(moving),
+    };
+    let devices = Devices::of(board);
+    let spawner = board.tasks.spawner();
+    let place = board.house.clone();
+    board.tasks.spawner().spawn(async move {
+        let mut memory = memory(flash);
+        let (settings, _) = memory.load().await;
+        let vitals = Vitals {
+            free_memory: || 100_000,
+            reset_reason: reason,
+            last_panic: "",
+        };
+        let house = House::new(ArmData::default(), settings, IDENTITY, vitals);
+        let house = Rc::new(house);
+        place.replace(Some(house.clone()));
+
+        let served = house.clone();
+        spawner.spawn(async move {
+            let frames = TimedFrames::every(FRAME);
+            served.arm.tick(devices.servos, frames, FRAME).await
+        });
+        let served = house.clone();
+        spawner.spawn(async move { served.store.run(memory).await });
+        let served = house.clone();
+        spawner.spawn(async move { served.panel.shine(devices.light).await });
+        let served = house.clone();
+        spawner.spawn(async move { panel::watch(&served, devices.button).await });
+        let served = house.clone();
+        spawner.spawn(async move { network::run(&served, devices.radio, devices.address).await });
+        let server = Rc::new(Server::new());
+        let acceptor = Rc::new(devices.acceptor);
+        for client in (0..).map_while(Client::new) {
+            let (served, server, acceptor) = (house.clone(), server.clone(), acceptor.clone());
+            spawner.spawn(async move { server.work(&*acceptor, client, &served).await });
+        }
+        spawner.spawn(async move { server.turn_away(&*acceptor).await });
+    });
+}
+
+struct Devices {
+    servos: Servos,
+    light: Light,
+    button: Button,
+    radio: RecordedRadio,
+    address: RecordedAddress,
+    acceptor: Acceptor,
+}
+
+impl Devices {
+    fn of(board: &Board) -> Self {
+        let power = || board.power.clone();
+        Self {
+            servos: Servos {
+                record: board.arm.clone(),
+                power: power(),
+                frame: FRAME,
+            },
+            light: Light {
+                record: board.light.clone(),
+                power: power(),
+            },
+            button: Button::new(board.button.clone()),
+            radio: RecordedRadio::new(board.air.clone(), board.radio.clone(), power()),
+            address: RecordedAddress(board.radio.clone()),
+            acceptor: Acceptor {
+                port: board.port.clone(),
+                power: power(),
+            },
+        }
+    }
+}
+
+/// What a start would find in these cells, which stay as they are.
+pub fn remembered(cells: &Cells) -> Settings {
+    let flash = Flash {
+        cells: Rc::new(RefCell::new(cells.clone())),
+        power: Power::present(),
+        moving: Rc::new(|| false),
+    };
+    embassy_futures::block_on(memory(flash).load()).0
+}

@@ -1,0 +1,147 @@
+//! A board in a script's hands: the firmware's services on devices that a script sees and moves, in virtual
+//! time, in one thread. Power comes and goes; the flash, the air and the clients stay.
+
+pub mod arm;
+pub mod button;
+mod firmware_tasks;
+pub mod flash;
+pub mod journal;
+pub mod light;
+pub mod power;
+pub mod radio;
+pub mod tasks;
+pub mod tcp;
+pub mod wire;
+
+use arm::ArmRecord;
+use button::Contact;
+use embassy_time::{Duration, Instant};
+use firmware::boards::desktop::clock::HandTime;
+use firmware::boards::scripted_radio::{Air, Pace};
+use firmware::services::House;
+use flash::Cells;
+use light::LightRecord;
+use power::Power;
+use protocol_core::settings::Settings;
+use protocol_core::wifi::Ssid;
+use radio::RadioRecord;
+use std::cell::RefCell;
+use std::rc::Rc;
+use tasks::Tasks;
+use tcp::Port;
+
+/// Time between two set-points of the servos, as on desktop and virt.
+pub const FRAME: Duration = Duration::from_millis(10);
+/// More polls than this without time going on, and the firmware runs in circles.
+const POLLS_AT_MOST: usize = 200_000;
+
+/// The devices, and the firmware while there is power.
+pub struct Board {
+    time: HandTime,
+    /// Supply, and what has gone wrong with the firmware.
+    pub power: Power,
+    /// What is in the air.
+    pub air: Rc<Air>,
+    /// What the radio did.
+    pub radio: Rc<RadioRecord>,
+    /// What the light did.
+    pub light: Rc<LightRecord>,
+    /// What the arm did.
+    pub arm: Rc<ArmRecord>,
+    /// What moves the button.
+    pub button: Rc<Contact>,
+    /// The memory.
+    pub cells: Rc<RefCell<Cells>>,
+    /// Where clients connect.
+    pub port: Rc<Port>,
+    house: Rc<RefCell<Option<Rc<House>>>>,
+    tasks: Tasks,
+}
+
+impl Board {
+    /// A new machine in its box: nothing stored, no power. Time begins at 0, and belongs to this thread.
+    pub fn new() -> Self {
+        Self {
+            time: HandTime::take(),
+            power: Power::default(),
+            air: Rc::new(Air::new(Pace::LIFELIKE)),
+            radio: Rc::default(),
+            light: Rc::default(),
+            arm: Rc::default(),
+            button: Rc::default(),
+            cells: Rc::default(),
+            port: Rc::default(),
+            house: Rc::default(),
+            tasks: Tasks::default(),
+        }
+    }
+
+    /// Power comes, and the firmware starts for `reason`.
+    pub fn power_on(&mut self, reason: &'static str) {
+        self.cut_the_power();
+        self.power.switch(true);
+        firmware_tasks::start(self, reason);
+    }
+
+    /// Power goes, in the middle of whatever the firmware does.
+    pub fn cut_the_power(&mut self) {
+        if self.power.is_on() {
+            self.power.switch(false);
+        }
+        self.tasks = Tasks::default();
+        self.house.take();
+        self.port.power_off();
+        self.arm.power_off();
+        self.light.show(Default::default());
+        self.cells.borrow_mut().stop_failing();
+        self.radio.asked.set(false);
+    }
+
+    /// Lets the firmware do all that it does without time going on; says whether that was anything.
+    pub fn settle(&mut self) -> bool {
+        let mut polls = 0;
+        while self.power.is_on() && (self.tasks.poll_one() || self.tasks_wait_for_now()) {
+            polls += 1;
+            if polls > POLLS_AT_MOST {
+                self.power
+                    .offend("the firmware runs in circles: no time goes by");
+                return false;
+            }
+        }
+        if !self.power.is_on() && self.house.borrow().is_some() {
+            // It failed by itself.
+            self.cut_the_power();
+        }
+        polls > 0
+    }
+
+    /// Rings alarms that are due already, and says whether some were.
+    fn tasks_wait_for_now(&mut self) -> bool {
+        self.time.next_alarm();
+        self.tasks.poll_one()
+    }
+
+    /// Lets time go on to the next alarm, at most to `deadline`.
+    pub fn step(&mut self, deadline: Instant) {
+        let next = self.time.next_alarm().unwrap_or(deadline);
+        self.time.go_on_to(next.min(deadline));
+    }
+
+    /// Whether a computer in this network reaches the machine.
+    pub fn is_reachable(&self, network: &Ssid) -> bool {
+        let joined = self.radio.asked.get() && self.air.joined().as_ref() == Some(network);
+        let own = self.radio.serving.get() && self.air.own().as_ref() == Some(network);
+        self.power.is_on() && (joined || own)
+    }
+
+    /// What a restart would find in memory.
+    pub fn remembered(&self) -> Settings {
+        firmware_tasks::remembered(&self.cells.borrow())
+    }
+}
+
+impl Default for Board {
+    fn default() -> Self {
+        Self::new()
+    }
+}

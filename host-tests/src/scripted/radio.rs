@@ -1,0 +1,132 @@
+//! The radio and what a network gives: each attempt is on record, and so is whether the machine has an
+//! address.
+
+use super::journal::note;
+use super::power::Power;
+use firmware::board::{Address, Radio, RadioFault};
+use firmware::boards::scripted_radio::{Air, ScriptedRadio};
+use heapless::Vec;
+use protocol_core::wifi::{Heard, Joined, Network, Ssid};
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::future::pending;
+use std::rc::Rc;
+
+/// What the radio was told to do, for the script to take out.
+#[derive(Debug, Default)]
+pub struct RadioRecord {
+    /// Networks that were tried, and how that ended.
+    pub tries: RefCell<VecDeque<(Ssid, Joined)>>,
+    /// Access points that were opened.
+    pub opened: RefCell<VecDeque<Ssid>>,
+    /// The machine has asked the joined network for an address.
+    pub asked: Cell<bool>,
+    /// The machine gives its guests addresses.
+    pub serving: Cell<bool>,
+}
+
+/// A network's name as a script writes it.
+pub fn shown(ssid: &Ssid) -> String {
+    format!("\"{}\"", ssid.as_bytes().escape_ascii())
+}
+
+/// The radio of the board.
+pub struct RecordedRadio {
+    inner: ScriptedRadio<Rc<Air>>,
+    record: Rc<RadioRecord>,
+    power: Power,
+}
+
+impl RecordedRadio {
+    /// A radio in this air.
+    pub fn new(air: Rc<Air>, record: Rc<RadioRecord>, power: Power) -> Self {
+        let inner = ScriptedRadio::new(air);
+        Self {
+            inner,
+            record,
+            power,
+        }
+    }
+}
+
+impl Radio for RecordedRadio {
+    async fn scan<const N: usize>(&mut self, heard: &mut Vec<Heard, N>) -> Result<(), RadioFault> {
+        let outcome = self.inner.scan(heard).await;
+        match outcome {
+            Ok(()) => note(format_args!("    radio: hears {} networks", heard.len())),
+            Err(RadioFault) => note("    radio: fails to listen"),
+        }
+        outcome
+    }
+
+    async fn join(&mut self, network: &Network) -> Joined {
+        let name = shown(&network.ssid);
+        note(format_args!("    radio: tries {name}"));
+        self.record.asked.set(false);
+        let outcome = self.inner.join(network).await;
+        if self.power.is_on() {
+            note(format_args!("    radio: {name}: {outcome:?}"));
+            let mut tries = self.record.tries.borrow_mut();
+            tries.push_back((network.ssid.clone(), outcome));
+        }
+        outcome
+    }
+
+    async fn leave(&mut self) {
+        if self.inner.is_joined() {
+            note("    radio: leaves the network");
+        }
+        self.inner.leave().await;
+    }
+
+    async fn open_access_point(&mut self, network: &Network) -> Result<(), RadioFault> {
+        let name = shown(&network.ssid);
+        let outcome = self.inner.open_access_point(network).await;
+        match outcome {
+            Ok(()) => {
+                note(format_args!("    radio: opens {name}"));
+                let mut opened = self.record.opened.borrow_mut();
+                opened.push_back(network.ssid.clone());
+            }
+            Err(RadioFault) => note(format_args!("    radio: fails to open {name}")),
+        }
+        outcome
+    }
+
+    async fn close_access_point(&mut self) -> Result<(), RadioFault> {
+        note("    radio: closes the access point");
+        self.inner.close_access_point().await
+    }
+
+    fn is_joined(&self) -> bool {
+        self.inner.is_joined()
+    }
+
+    async fn lost(&mut self) {
+        self.inner.lost().await;
+        note("    radio: the network is lost");
+    }
+}
+
+/// The network stack's address, on record.
+pub struct RecordedAddress(pub Rc<RadioRecord>);
+
+struct Serving<'a>(&'a Cell<bool>);
+
+impl Drop for Serving<'_> {
+    fn drop(&mut self) {
+        self.0.set(false);
+    }
+}
+
+impl Address for RecordedAddress {
+    fn ask(&self) {
+        self.0.asked.set(true);
+    }
+
+    async fn serve_guests(&self) -> ! {
+        self.0.serving.set(true);
+        let _serving = Serving(&self.0.serving);
+        pending().await
+    }
+}
