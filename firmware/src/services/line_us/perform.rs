@@ -1,0 +1,195 @@
+//! What a line asks for is done here.
+
+use crate::services::House;
+use core::fmt::Display;
+use protocol_core::lineus::{Diagnostics, Refusal, Reply, Request};
+use protocol_core::machine::Client;
+use protocol_core::motion::{Micros, Steps};
+use protocol_core::settings::{MachineName, Settings};
+use protocol_core::wifi::{Full, Heard, MAX_NETWORKS, Network, Networks, Password, Ssid};
+
+/// Does what a line asks for, and puts the answer into `reply`.
+pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &House) {
+    let arm = &house.arm;
+    match request {
+        Request::Answered => {}
+        Request::Errand(errand) => reply.report(&arm.errand(client, errand).await),
+        Request::SetSpeed { pen_down, pen_up } => {
+            arm.with(|machine| {
+                let now = machine.steps();
+                machine.set_steps(Steps {
+                    pen_down: pen_down.unwrap_or(now.pen_down),
+                    pen_up: pen_up.unwrap_or(now.pen_up),
+                });
+            });
+            reply.ok();
+        }
+        Request::Position => reply.position(arm.with(|machine| machine.position())),
+        Request::Angles => reply.angles(arm.with(|machine| machine.angles())),
+        Request::Capabilities => reply.capabilities(&house.name(), house.wifi.is_setup()),
+        Request::Diagnostics => diagnose(reply, house),
+        Request::Name => reply.name(&house.name()),
+        Request::Rename(name) => rename(name, reply, client, house).await,
+        Request::Start => house.settings(|settings| reply.start(settings)),
+        Request::SetStart { mode, name } => {
+            let set = |settings: &mut Settings| {
+                settings.start = mode.unwrap_or(settings.start);
+                settings.access_point = name.unwrap_or(settings.access_point);
+                Ok(())
+            };
+            change("start mode", set, reply, client, house).await;
+        }
+        Request::Waves => reply.waves(house.settings(|settings| settings.waves)),
+        Request::SetWaves(on) => {
+            let set = |settings: &mut Settings| {
+                settings.waves = *on;
+                Ok(())
+            };
+            change("setting", set, reply, client, house).await;
+        }
+        Request::Networks => list(reply, house).await,
+        Request::Remember { ssid, password } => {
+            remember(ssid, password.as_ref(), reply, client, house).await;
+        }
+        Request::Forget(ssid) => {
+            forget(ssid, reply, client, house).await;
+        }
+        Request::ForgetAll => {
+            let forget = |settings: &mut Settings| {
+                settings.networks.clear();
+                Ok(())
+            };
+            change("networks", forget, reply, client, house).await;
+            house.wifi.changed();
+        }
+        Request::Calibrate => calibrate(true, reply, client, house).await,
+        Request::ClearCalibration => calibrate(false, reply, client, house).await,
+    }
+}
+
+fn diagnose(reply: &mut Reply, house: &House) {
+    let (position, calibration) = house
+        .arm
+        .with(|machine| (machine.position(), machine.calibration()));
+    reply.diagnostics(&Diagnostics {
+        name: &house.name(),
+        identity: house.identity,
+        uptime: Micros::new(house.uptime().as_micros()),
+        position,
+        calibration,
+        wifi: &house.wifi.status(),
+        networks: house.settings(|settings| settings.networks.len()),
+        free_memory: (house.vitals.free_memory)(),
+        reset_reason: house.vitals.reset_reason,
+        memory: house.store.health().text(),
+        last_panic: house.vitals.last_panic,
+    });
+}
+
+async fn rename(name: &MachineName, reply: &mut Reply, client: Client, house: &House) {
+    let renamed = house.change(client, |settings| settings.name = name.clone());
+    match renamed.await {
+        Ok(()) => reply.name(name),
+        Err(error) => refuse_store("name", &error, reply),
+    }
+}
+
+/// Networks that are heard and networks that are remembered.
+async fn list(reply: &mut Reply, house: &House) {
+    let fill = |heard: &[Heard]| {
+        house.settings(|settings| reply.networks(heard, &settings.networks));
+    };
+    house.wifi.with_heard(fill).await;
+}
+
+/// A station remembers the network and stays where it is. In setup the reply comes first, because the
+/// attempt to join may end this connection, and the network is remembered if it succeeds.
+async fn remember(
+    ssid: &Ssid,
+    password: Option<&Password>,
+    reply: &mut Reply,
+    client: Client,
+    house: &House,
+) {
+    if house.wifi.is_setup() {
+        match house.settings(|settings| completed(ssid, password, &settings.networks)) {
+            Ok(network) => {
+                reply.ok();
+                house.wifi.attempt(network);
+            }
+            Err(refusal) => reply.refuse(&refusal),
+        }
+        return;
+    }
+    let put = |settings: &mut Settings| {
+        let network = completed(ssid, password, &settings.networks)?;
+        settings
+            .networks
+            .put(network)
+            .map_err(|Full| Refusal::TooManyNetworks)
+    };
+    change("network", put, reply, client, house).await;
+    house.wifi.changed();
+}
+
+/// A network for which there is a place; one that comes without a password has the one that is
+/// remembered, or is open.
+fn completed<'a>(
+    ssid: &Ssid,
+    password: Option<&Password>,
+    known: &Networks,
+) -> Result<Network, Refusal<'a>> {
+    let remembered = known.find(ssid);
+    if remembered.is_none() && known.len() == MAX_NETWORKS {
+        return Err(Refusal::TooManyNetworks);
+    }
+    let password = password.or(remembered.and_then(|known| known.password.as_ref()));
+    Ok(Network {
+        ssid: ssid.clone(),
+        password: password.cloned(),
+    })
+}
+
+async fn forget(ssid: &Ssid, reply: &mut Reply, client: Client, house: &House) {
+    let remove = |settings: &mut Settings| match settings.networks.remove(ssid) {
+        true => Ok(()),
+        false => Err(Refusal::NoSuchNetwork(ssid.as_bytes())),
+    };
+    change("network", remove, reply, client, house).await;
+    house.wifi.changed();
+}
+
+/// Changes settings, and answers `ok`, or why not.
+async fn change<'a>(
+    what: &str,
+    change: impl FnOnce(&mut Settings) -> Result<(), Refusal<'a>>,
+    reply: &mut Reply,
+    client: Client,
+    house: &House,
+) {
+    match house.change(client, change).await {
+        Ok(Ok(())) => reply.ok(),
+        Ok(Err(refusal)) => reply.refuse(&refusal),
+        Err(error) => refuse_store(what, &error, reply),
+    }
+}
+
+/// Makes the place where the arm rests the calibration point, or removes the calibration.
+async fn calibrate(here: bool, reply: &mut Reply, client: Client, house: &House) {
+    let calibrated = house.change(client, |settings| {
+        settings.calibration = match here {
+            true => house.arm.with(|machine| machine.calibration_here()),
+            false => Default::default(),
+        };
+    });
+    match calibrated.await {
+        Ok(()) => reply.ok(),
+        Err(error) => refuse_store("calibration", &error, reply),
+    }
+}
+
+fn refuse_store(what: &str, error: &dyn Display, reply: &mut Reply) {
+    reply.error(format_args!(
+        "the {what} is not stored and stays as it was: {error}"
+    ));
+}
