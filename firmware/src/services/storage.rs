@@ -3,7 +3,8 @@
 //! Written only while the arm rests: who asks for a store holds the arm at rest meanwhile.
 
 mod memory;
-mod page;
+mod parts;
+mod view;
 
 pub use memory::Memory;
 
@@ -39,7 +40,7 @@ pub enum MemoryHealth {
     Sound,
     /// The flash held something else than settings: the arm started with defaults.
     Foreign,
-    /// One of the two copies was lost, and has been written again.
+    /// One of the two copies was damaged, or its store cut short, and has been written again.
     Repaired,
     /// One of the two copies cannot be written any more: there is only the other.
     Single,
@@ -55,7 +56,7 @@ impl MemoryHealth {
             Self::Fresh => "ok, nothing stored yet",
             Self::Sound => "ok",
             Self::Foreign => "held no settings, started with defaults",
-            Self::Repaired => "ok, one of two copies was lost and is restored",
+            Self::Repaired => "ok, one of two copies had to be written again",
             Self::Single => "worn out, one of two copies cannot be written",
             Self::WornOut => "worn out, does not take what is stored",
         }

@@ -11,7 +11,7 @@
 //! Where one half is worn out, there is no such second copy. The other one is then written nevertheless,
 //! behind its old record, and the health says so.
 
-use super::page::Page;
+use super::view::{Access, LONGEST_WORD, Page};
 use super::{MemoryHealth, StoreError};
 use crate::log::warning;
 use core::ops::Range;
@@ -21,28 +21,26 @@ use protocol_core::settings::{MAX_RECORD, Settings};
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
-/// The record's key; 1 to 3 were those of single settings, `protocol_core::settings`.
-const KEY: u8 = b'Q';
+/// The record's key; 1 to 3 were those of single settings.
+pub(super) const KEY: u8 = b'Q';
 /// Bytes of the sequence number, little-endian.
 const SEQUENCE: usize = 4;
-/// The sequence number of a record on its way from the form of single settings, among which it lies:
-/// its half has to be erased before it is written again.
-const ON_ITS_WAY: u32 = 0;
+/// The sequence number of a record that lies among settings stored by themselves, `parts.rs`: its half has
+/// to be erased before it is written again.
+pub(super) const ON_ITS_WAY: u32 = 0;
 /// Longest item: sequence number and record.
 const MAX_ITEM: usize = SEQUENCE + MAX_RECORD;
 /// Room for the item with its key, rounded up to any flash's word.
-const BUFFER: usize = (1 + MAX_ITEM).next_multiple_of(32);
+const BUFFER: usize = (1 + MAX_ITEM).next_multiple_of(LONGEST_WORD);
 /// Pages of the smallest range: an erased one and another in each half.
 const MIN_PAGES: u32 = 4;
-/// How often a record is put among single settings before that is given up.
-const ATTEMPTS: u8 = 3;
 
 /// Nothing is cached: what is read comes from flash.
-type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
+pub(super) type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
 
 /// Some flash can be written from aligned memory only.
 #[repr(align(4))]
-struct Buffer([u8; BUFFER]);
+pub(super) struct Buffer(pub(super) [u8; BUFFER]);
 
 /// What a half holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,11 +103,11 @@ impl Halves {
 
 /// A range of flash that holds the settings.
 pub struct Memory<F> {
-    flash: F,
-    range: Range<u32>,
+    pub(super) flash: F,
+    pub(super) range: Range<u32>,
     /// What is to be in both halves: sequence number and record.
-    item: Vec<u8, MAX_ITEM>,
-    buffer: Buffer,
+    pub(super) item: Vec<u8, MAX_ITEM>,
+    pub(super) buffer: Buffer,
     /// The last sequence number that was given, whether or not it could be stored.
     last: u32,
     health: MemoryHealth,
@@ -158,7 +156,8 @@ impl<F: NorFlash> Memory<F> {
                 self.health = MemoryHealth::Foreign;
                 return Settings::default();
             };
-            halves = self.bring_over(&parts).await;
+            self.bring_over(&parts).await;
+            halves = self.look_at_both().await;
             moved = true;
             if halves.newest().is_none() {
                 self.health = MemoryHealth::WornOut;
@@ -177,7 +176,7 @@ impl<F: NorFlash> Memory<F> {
         moved |= newest == ON_ITS_WAY;
         self.last = newest.max(ON_ITS_WAY + 1);
         self.number(self.last);
-        let whole = moved || halves.lower.is_record() && halves.upper.is_record();
+        let whole = moved || self.is_item(halves.lower) && self.is_item(halves.upper);
         let held = self.spread(halves).await;
         self.health = match (held, whole) {
             ([true, true], true) => MemoryHealth::Sound,
@@ -209,10 +208,7 @@ impl<F: NorFlash> Memory<F> {
 
     /// Stores what was staged.
     pub(super) async fn commit(&mut self) -> Result<(), StoreError> {
-        let halves = Halves {
-            lower: self.look(Half::Lower).await,
-            upper: self.look(Half::Upper).await,
-        };
+        let halves = self.look_at_both().await;
         let newest = halves.newest();
         let known = |holding| matches!(holding, Holding::Record { sequence, same: true } if Some(sequence) == newest);
         let kept = [known(halves.lower), known(halves.upper)];
@@ -301,6 +297,14 @@ impl<F: NorFlash> Memory<F> {
         self.examine(half, None).await
     }
 
+    /// What the halves hold now.
+    async fn look_at_both(&mut self) -> Halves {
+        Halves {
+            lower: self.look(Half::Lower).await,
+            upper: self.look(Half::Upper).await,
+        }
+    }
+
     /// What the halves hold; the newest record becomes the item.
     async fn look_and_adopt(&mut self) -> Halves {
         let lower = self.examine(Half::Lower, Some(None)).await;
@@ -313,7 +317,7 @@ impl<F: NorFlash> Memory<F> {
         let range = self.half(half);
         let mut holding = Holding::Other;
         for start in range.clone().step_by(F::ERASE_SIZE) {
-            let page = Page::new(&mut self.flash, start);
+            let page = Page::new(&mut self.flash, start, Access::Read);
             let Ok(config) = MapConfig::try_new(0..Page::<F>::SIZE) else {
                 break;
             };
@@ -346,10 +350,8 @@ impl<F: NorFlash> Memory<F> {
     }
 
     async fn is_blank(&mut self, range: Range<u32>) -> bool {
-        /// Any flash's word, and a divisor of any page.
-        const PIECE: usize = 32;
-        for offset in range.step_by(PIECE) {
-            let piece = self.buffer.0.first_chunk_mut::<PIECE>();
+        for offset in range.step_by(LONGEST_WORD) {
+            let piece = self.buffer.0.first_chunk_mut::<LONGEST_WORD>();
             let Some(piece) = piece else { return false };
             let read = self.flash.read(offset, piece).await;
             if read.is_err() || piece.iter().any(|byte| *byte != 0xff) {
@@ -359,41 +361,8 @@ impl<F: NorFlash> Memory<F> {
         true
     }
 
-    /// Settings that are stored by themselves, in one map over the whole range, if there are any.
-    async fn parts(&mut self) -> Option<Settings> {
-        let mut settings = Settings::default();
-        let mut found = None;
-        for key in Settings::PART_KEYS {
-            let config = MapConfig::try_new(self.range.clone()).ok()?;
-            let mut map: MapStorage<u8, _, NoCache> =
-                MapStorage::new(&mut self.flash, config, Cache::new_uncached());
-            let part = map.fetch_item::<&[u8]>(&mut self.buffer.0, &key).await;
-            if let Ok(Some(bytes)) = part {
-                found = found.or(settings.take_part(key, bytes));
-            }
-        }
-        found.map(|()| settings)
-    }
-
-    /// Puts the record of settings that were stored by themselves behind these, in the same map: once it
-    /// is whole, the half where it lies has a good copy, and before that they all are where they were.
-    async fn bring_over(&mut self, parts: &Settings) -> Halves {
-        self.stage(parts);
-        self.number(ON_ITS_WAY);
-        let mut attempts = 0..ATTEMPTS;
-        loop {
-            self.append(self.range.clone()).await;
-            let lower = self.look(Half::Lower).await;
-            let upper = self.look(Half::Upper).await;
-            let halves = Halves { lower, upper };
-            if halves.newest().is_some() || attempts.next().is_none() {
-                return halves;
-            }
-        }
-    }
-
     /// Numbers the item.
-    fn number(&mut self, sequence: u32) {
+    pub(super) fn number(&mut self, sequence: u32) {
         if let Some(number) = self.item.first_chunk_mut() {
             *number = sequence.to_le_bytes();
         }
