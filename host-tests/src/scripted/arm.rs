@@ -27,7 +27,6 @@ pub struct ArmRecord(RefCell<Path>);
 #[derive(Debug, Default)]
 struct Path {
     places: Vec<(Instant, [f64; 3])>,
-    moving: bool,
     last_frame: Option<Instant>,
 }
 
@@ -39,7 +38,6 @@ impl ArmRecord {
     /// The power has gone: the arm stands still.
     pub fn power_off(&self) {
         let mut path = self.0.borrow_mut();
-        path.moving = false;
         path.last_frame = None;
     }
 
@@ -53,11 +51,6 @@ impl ArmRecord {
     pub fn there_since(&self) -> Instant {
         let path = self.0.borrow();
         path.places.last().map_or(Instant::MIN, |(at, _)| *at)
-    }
-
-    /// Whether a move is under way, by the last set-point.
-    pub fn is_moving(&self) -> bool {
-        self.0.borrow().moving
     }
 
     /// How many places there are, for [`Self::passed`] and [`Self::waved`].
@@ -94,7 +87,7 @@ impl ArmRecord {
         };
         let went = places.iter().any(|(_, place)| *place != HOME);
         let back = places.last().is_some_and(|(_, place)| *place == HOME);
-        went && back && !path.moving && places.iter().all(|(_, place)| near(place))
+        went && back && places.iter().all(|(_, place)| near(place))
     }
 }
 
@@ -123,9 +116,8 @@ impl board::Servos for Servos {
                 (now - last).as_micros()
             ));
         }
-        path.moving = set_point.moving;
         let place = place(set_point.position);
-        if path.places.last().is_some_and(|(_, last)| *last == place) {
+        if path.places.last().map_or(HOME, |(_, last)| *last) == place {
             return;
         }
         path.places.push((now, place));
