@@ -138,3 +138,65 @@ impl board::Servos for Servos {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_time::Duration;
+    use firmware::board::Servos as _;
+    use firmware::boards::desktop::clock::HandTime;
+    use protocol_core::machine::{ArmData, Machine};
+    use protocol_core::motion::{Coordinate, PulseWidth};
+
+    /// What is said of set-points that come every 10 ms, after home.
+    fn offence(after_home: impl FnOnce(&mut SetPoint), late: u64) -> Option<String> {
+        let time = HandTime::take();
+        let mut servos = Servos {
+            record: Rc::default(),
+            power: Power::present(),
+            frame: Duration::from_millis(10),
+        };
+        let mut machine = Machine::new(ArmData::default(), Default::default());
+        let mut set_point = machine.tick(Micros::default());
+        servos.write(Micros::default(), &set_point);
+        assert_eq!(servos.power.offence(), None);
+        after_home(&mut set_point);
+        time.go_on_to(Instant::from_millis(10 + late));
+        servos.write(Micros::default(), &set_point);
+        servos.power.offence()
+    }
+
+    fn at(x: i16, y: i16, z: i16) -> impl FnOnce(&mut SetPoint) {
+        move |set_point| {
+            set_point.position = Position {
+                x: Coordinate::from_units(x),
+                y: Coordinate::from_units(y),
+                z: Coordinate::from_units(z),
+            };
+        }
+    }
+
+    #[test]
+    fn what_must_never_happen_is_an_offence() {
+        assert_eq!(offence(at(1950, 0, 0), 0), None);
+        let said = |offence: Option<String>| offence.unwrap_or_default();
+        for (x, y, z) in [
+            (1951, 0, 0),
+            (690, -300, 0),
+            (1000, 1000, -1),
+            (1000, 1000, 1001),
+        ] {
+            let said = said(offence(at(x, y, z), 0));
+            assert!(
+                said.contains("leaves its drawing area"),
+                "{x} {y} {z}: {said}"
+            );
+        }
+        assert!(said(offence(at(1000, 900, 0), 1)).contains("11000 us after"));
+        let wide = |set_point: &mut SetPoint| {
+            at(1000, 900, 0)(set_point);
+            set_point.pulses[2] = PulseWidth::from_micros(2501);
+        };
+        assert!(said(offence(wide, 0)).contains("2501.00 us"));
+    }
+}
