@@ -262,3 +262,88 @@ impl<A: Deref<Target = Air>> Radio for ScriptedRadio<A> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_futures::{block_on, poll_once};
+
+    fn on_air(name: &str, password: Option<&str>, signal_dbm: i8) -> OnAir {
+        OnAir::new(name.as_bytes(), password.map(str::as_bytes), signal_dbm).unwrap()
+    }
+
+    fn network(name: &str, password: Option<&str>) -> Network {
+        let OnAir { ssid, password, .. } = on_air(name, password, 0);
+        Network { ssid, password }
+    }
+
+    #[test]
+    fn networks_are_heard_strongest_first() {
+        let air = Air::new(Pace::INSTANT);
+        for (name, signal) in [("a", -60), ("b", -40), ("c", -80), ("a", -30)] {
+            air.put(on_air(name, None, signal));
+        }
+        let mut radio = ScriptedRadio::new(&air);
+        let mut heard = Vec::<Heard, 2>::new();
+        block_on(radio.scan(&mut heard)).unwrap();
+        let heard: std::vec::Vec<_> = heard
+            .iter()
+            .map(|heard| (heard.ssid.as_bytes(), heard.signal_dbm))
+            .collect();
+        assert_eq!(heard, [(&b"a"[..], -30), (b"b", -40)]);
+    }
+
+    #[test]
+    fn joining_ends_in_one_of_four_ways() {
+        let air = Air::new(Pace::INSTANT);
+        air.put(on_air("home", Some("correct horse"), -50));
+        let mut radio = ScriptedRadio::new(&air);
+        let mut join = |network: &Network| block_on(radio.join(network));
+        let home = network("home", Some("correct horse"));
+        assert_eq!(join(&home), Joined::Yes);
+        assert_eq!(air.joined(), Some(home.ssid.clone()));
+        assert_eq!(join(&network("other", None)), Joined::NotFound);
+        assert_eq!(air.joined(), None);
+        for wrong in [None, Some("wrong horse")] {
+            assert_eq!(join(&network("home", wrong)), Joined::WrongPassword);
+        }
+        air.set_fault(true);
+        assert!(matches!(join(&home), Joined::Failed(_)));
+        assert_eq!(air.joined(), None);
+    }
+
+    #[test]
+    fn a_joined_network_is_lost_when_it_goes_or_changes() {
+        let home = network("home", None);
+        let losses: [fn(&Air, &mut ScriptedRadio<&Air>); 4] = [
+            |air, _| air.cut(),
+            |air, _| air.remove(&Ssid::new(b"home").unwrap()),
+            |air, _| air.put(on_air("home", Some("correct horse"), -50)),
+            |_, radio| block_on(radio.open_access_point(&network("own", None))).unwrap(),
+        ];
+        for lose in losses {
+            let air = Air::new(Pace::INSTANT);
+            air.put(on_air("home", None, -50));
+            let mut radio = ScriptedRadio::new(&air);
+            assert_eq!(block_on(radio.join(&home)), Joined::Yes);
+            assert!(poll_once(radio.lost()).is_pending());
+            air.put(on_air("home", None, -70));
+            air.remove(&Ssid::new(b"other").unwrap());
+            assert!(poll_once(radio.lost()).is_pending());
+            lose(&air, &mut radio);
+            assert!(poll_once(radio.lost()).is_ready());
+            assert!(!radio.is_joined());
+        }
+    }
+
+    #[test]
+    fn its_own_network_goes_with_its_power() {
+        let air = Air::new(Pace::INSTANT);
+        let own = network("own", None);
+        let mut radio = ScriptedRadio::new(&air);
+        block_on(radio.open_access_point(&own)).unwrap();
+        assert_eq!(air.own(), Some(own.ssid));
+        drop(radio);
+        assert_eq!(air.own(), None);
+    }
+}

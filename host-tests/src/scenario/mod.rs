@@ -4,6 +4,7 @@
 mod client;
 mod command;
 mod expect;
+mod parse;
 mod stage;
 mod words;
 
@@ -116,7 +117,7 @@ fn play_once(name: &str, text: &str) -> Result<(), Box<Failure>> {
         .filter(|(_, line)| is_command(line));
     let mut commands = Vec::new();
     for (index, line) in lines {
-        let command = command::parse(line);
+        let command = parse::parse(line);
         let command = command.map_err(|why| {
             failure(
                 index + 1,

@@ -267,7 +267,8 @@ impl Stage {
         if let Some((ssid, outcome)) = tries.front() {
             return Some(format!("the machine tries {}: {outcome:?}", shown(ssid)));
         }
-        let looked = self.looked?;
+        // Without power it is dark, whatever was seen before.
+        let looked = self.looked.filter(|_| self.board.power.is_on())?;
         (self.board.light.pattern() != Some(looked))
             .then(|| format!("{} (it was {looked})", self.board.light.describe()))
     }

@@ -27,7 +27,6 @@ pub struct ArmRecord(RefCell<Path>);
 #[derive(Debug, Default)]
 struct Path {
     places: Vec<(Instant, [f64; 3])>,
-    moving: bool,
     last_frame: Option<Instant>,
 }
 
@@ -39,7 +38,6 @@ impl ArmRecord {
     /// The power has gone: the arm stands still.
     pub fn power_off(&self) {
         let mut path = self.0.borrow_mut();
-        path.moving = false;
         path.last_frame = None;
     }
 
@@ -53,11 +51,6 @@ impl ArmRecord {
     pub fn there_since(&self) -> Instant {
         let path = self.0.borrow();
         path.places.last().map_or(Instant::MIN, |(at, _)| *at)
-    }
-
-    /// Whether a move is under way, by the last set-point.
-    pub fn is_moving(&self) -> bool {
-        self.0.borrow().moving
     }
 
     /// How many places there are, for [`Self::passed`] and [`Self::waved`].
@@ -94,7 +87,7 @@ impl ArmRecord {
         };
         let went = places.iter().any(|(_, place)| *place != HOME);
         let back = places.last().is_some_and(|(_, place)| *place == HOME);
-        went && back && !path.moving && places.iter().all(|(_, place)| near(place))
+        went && back && places.iter().all(|(_, place)| near(place))
     }
 }
 
@@ -123,9 +116,8 @@ impl board::Servos for Servos {
                 (now - last).as_micros()
             ));
         }
-        path.moving = set_point.moving;
         let place = place(set_point.position);
-        if path.places.last().is_some_and(|(_, last)| *last == place) {
+        if path.places.last().map_or(HOME, |(_, last)| *last) == place {
             return;
         }
         path.places.push((now, place));
@@ -144,5 +136,67 @@ impl board::Servos for Servos {
                     .offend(format!("a servo gets a pulse of {width:.2} us"));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_time::Duration;
+    use firmware::board::Servos as _;
+    use firmware::boards::desktop::clock::HandTime;
+    use protocol_core::machine::{ArmData, Machine};
+    use protocol_core::motion::{Coordinate, PulseWidth};
+
+    /// What is said of set-points that come every 10 ms, after home.
+    fn offence(after_home: impl FnOnce(&mut SetPoint), late: u64) -> Option<String> {
+        let time = HandTime::take();
+        let mut servos = Servos {
+            record: Rc::default(),
+            power: Power::present(),
+            frame: Duration::from_millis(10),
+        };
+        let mut machine = Machine::new(ArmData::default(), Default::default());
+        let mut set_point = machine.tick(Micros::default());
+        servos.write(Micros::default(), &set_point);
+        assert_eq!(servos.power.offence(), None);
+        after_home(&mut set_point);
+        time.go_on_to(Instant::from_millis(10 + late));
+        servos.write(Micros::default(), &set_point);
+        servos.power.offence()
+    }
+
+    fn at(x: i16, y: i16, z: i16) -> impl FnOnce(&mut SetPoint) {
+        move |set_point| {
+            set_point.position = Position {
+                x: Coordinate::from_units(x),
+                y: Coordinate::from_units(y),
+                z: Coordinate::from_units(z),
+            };
+        }
+    }
+
+    #[test]
+    fn what_must_never_happen_is_an_offence() {
+        assert_eq!(offence(at(1950, 0, 0), 0), None);
+        let said = |offence: Option<String>| offence.unwrap_or_default();
+        for (x, y, z) in [
+            (1951, 0, 0),
+            (690, -300, 0),
+            (1000, 1000, -1),
+            (1000, 1000, 1001),
+        ] {
+            let said = said(offence(at(x, y, z), 0));
+            assert!(
+                said.contains("leaves its drawing area"),
+                "{x} {y} {z}: {said}"
+            );
+        }
+        assert!(said(offence(at(1000, 900, 0), 1)).contains("11000 us after"));
+        let wide = |set_point: &mut SetPoint| {
+            at(1000, 900, 0)(set_point);
+            set_point.pulses[2] = PulseWidth::from_micros(2501);
+        };
+        assert!(said(offence(wide, 0)).contains("2501.00 us"));
     }
 }

@@ -120,3 +120,28 @@ impl Wait for Button {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_futures::poll_once;
+
+    #[test]
+    fn levels_and_edges() {
+        let contact = Rc::new(Contact::default());
+        let mut button = Button::new(contact.clone());
+        assert!(button.is_high().unwrap());
+        assert!(poll_once(button.wait_for_high()).is_ready());
+        assert!(poll_once(button.wait_for_low()).is_pending());
+        assert!(poll_once(button.wait_for_any_edge()).is_pending());
+        contact.set(true);
+        assert!(button.is_low().unwrap());
+        assert!(poll_once(button.wait_for_rising_edge()).is_pending());
+        contact.set(false);
+        // It was down meanwhile.
+        contact.set(true);
+        contact.set(false);
+        assert!(poll_once(button.wait_for_falling_edge()).is_ready());
+        assert!(poll_once(button.wait_for_falling_edge()).is_pending());
+    }
+}

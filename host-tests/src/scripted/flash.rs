@@ -92,40 +92,29 @@ pub struct Flash {
 }
 
 impl Flash {
-    async fn change(&mut self, begin: u32, length: u32, new: impl Fn(usize, &mut u8)) {
+    /// Looks whether it may be changed.
+    async fn begin(&mut self) -> Result<(), Refused> {
+        if !self.power.is_on() {
+            pending::<()>().await;
+        }
         if (self.moving)() {
             self.power
                 .offend("the memory is written while a move is under way");
         }
-        let mut fails = false;
-        {
-            let mut cells = self.cells.borrow_mut();
-            for index in 0..length as usize {
-                fails = !self.power.is_on() || cells.fails_now();
-                if fails {
-                    break;
-                }
-                new(index, &mut cells.bytes[begin as usize + index]);
-            }
-        }
-        if fails {
-            if self.power.is_on() {
-                note(format_args!(
-                    "    memory: power fails while {begin:#x} is written"
-                ));
-                self.power.switch(false);
-            }
-            // Nothing comes after this.
-            pending::<()>().await;
-        }
-    }
-
-    fn worn(&self) -> Result<(), Refused> {
         if self.cells.borrow().worn {
             note("    memory: refuses");
             return Err(Refused(NorFlashErrorKind::Other));
         }
         Ok(())
+    }
+
+    /// The power fails: nothing comes after this.
+    async fn fail(&self, at: u32) -> ! {
+        note(format_args!(
+            "    memory: power fails while {at:#x} is written"
+        ));
+        self.power.switch(false);
+        pending().await
     }
 }
 
@@ -167,17 +156,15 @@ impl NorFlash for Flash {
         let length = to.checked_sub(from);
         let length = length.ok_or(Refused(NorFlashErrorKind::OutOfBounds))?;
         check(from, length, Self::ERASE_SIZE as u32)?;
-        self.worn()?;
+        self.begin().await?;
         for page in (from..to).step_by(Self::ERASE_SIZE) {
             // An erase that is cut short leaves the end of its page as it was.
             let fails = self.cells.borrow_mut().fails_now();
-            let length = Self::ERASE_SIZE as u32;
-            let whole = std::mem::take(&mut self.cells.borrow_mut().fails_after);
-            let done = if fails { length / 2 } else { length };
-            self.change(page, done, |_, byte| *byte = 0xff).await;
-            self.cells.borrow_mut().fails_after = whole;
+            let parts = if fails { 2 } else { 1 };
+            let begin = page as usize;
+            self.cells.borrow_mut().bytes[begin..begin + Self::ERASE_SIZE / parts].fill(0xff);
             if fails {
-                self.change(page, 1, |_, _| {}).await;
+                self.fail(page).await;
             }
         }
         Ok(())
@@ -185,11 +172,109 @@ impl NorFlash for Flash {
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refused> {
         check(offset, bytes.len() as u32, Self::WRITE_SIZE as u32)?;
-        self.worn()?;
-        self.change(offset, bytes.len() as u32, |index, byte| {
-            *byte &= bytes[index]
-        })
-        .await;
+        self.begin().await?;
+        for (at, byte) in (offset..).zip(bytes) {
+            if self.cells.borrow_mut().fails_now() {
+                self.fail(at).await;
+            }
+            self.cells.borrow_mut().bytes[at as usize] &= byte;
+        }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_futures::{block_on, poll_once};
+
+    fn flash(moving: bool) -> Flash {
+        Flash {
+            cells: Rc::default(),
+            power: Power::present(),
+            moving: Rc::new(move || moving),
+        }
+    }
+
+    fn first<const N: usize>(flash: &Flash) -> [u8; N] {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(&flash.cells.borrow().bytes[..N]);
+        bytes
+    }
+
+    #[test]
+    fn writing_clears_bits_and_erasing_sets_them() {
+        let mut flash = flash(false);
+        block_on(flash.write(0, &[0x0f; 4])).unwrap();
+        block_on(flash.write(0, &[0x3c; 4])).unwrap();
+        assert_eq!(first(&flash), [0x0c, 0x0c, 0x0c, 0x0c, 0xff]);
+        block_on(flash.erase(0, 4096)).unwrap();
+        assert_eq!(first(&flash), [0xff; 4]);
+        assert_eq!(flash.power.offence(), None);
+    }
+
+    #[test]
+    fn it_is_made_of_words_and_pages() {
+        let mut flash = flash(false);
+        for refused in [
+            block_on(flash.write(2, &[0; 4])),
+            block_on(flash.write(0, &[0; 3])),
+            block_on(flash.write(SIZE, &[0; 4])),
+            block_on(flash.erase(0, 4)),
+            block_on(flash.erase(4096, 0)),
+            block_on(flash.erase(0, SIZE + 4096)),
+            block_on(flash.read(SIZE - 1, &mut [0; 2])),
+        ] {
+            assert!(refused.is_err());
+        }
+        assert_eq!(first(&flash), [0xff; 4]);
+    }
+
+    #[test]
+    fn power_fails_after_so_many_bytes() {
+        for bytes in 0..8 {
+            let mut flash = flash(false);
+            flash.cells.borrow_mut().fail_after(bytes);
+            assert!(poll_once(flash.write(0, &[0; 8])).is_pending());
+            assert!(!flash.power.is_on());
+            let mut expected = [0xff; 8];
+            expected[..bytes as usize].fill(0);
+            assert_eq!(first(&flash), expected);
+        }
+        let mut flash = flash(false);
+        flash.cells.borrow_mut().fail_after(8);
+        assert!(poll_once(flash.write(0, &[0; 8])).is_ready());
+        assert!(flash.power.is_on());
+    }
+
+    #[test]
+    fn an_erase_that_is_cut_short_is_half_an_erase() {
+        let mut flash = flash(false);
+        flash.cells.borrow_mut().fill_with_garbage();
+        let before = flash.cells.borrow().bytes.clone();
+        flash.cells.borrow_mut().fail_after(1);
+        assert!(poll_once(flash.erase(0, 8192)).is_pending());
+        assert!(!flash.power.is_on());
+        let cells = flash.cells.borrow();
+        assert!(cells.bytes[..6144].iter().all(|byte| *byte == 0xff));
+        assert_eq!(cells.bytes[6144..], before[6144..]);
+    }
+
+    #[test]
+    fn worn_out_it_is_read_only() {
+        let mut flash = flash(false);
+        flash.cells.borrow_mut().wear_out(true);
+        assert!(block_on(flash.write(0, &[0; 4])).is_err());
+        assert!(block_on(flash.erase(0, 4096)).is_err());
+        assert!(block_on(flash.read(0, &mut [0; 4])).is_ok());
+    }
+
+    #[test]
+    fn it_must_not_be_written_in_motion() {
+        let mut flash = flash(true);
+        block_on(flash.read(0, &mut [0; 4])).unwrap();
+        assert_eq!(flash.power.offence(), None);
+        block_on(flash.write(0, &[0; 4])).unwrap();
+        assert!(flash.power.offence().is_some());
     }
 }

@@ -176,3 +176,62 @@ impl board::Light for Light {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use firmware::boards::desktop::clock::HandTime;
+
+    /// What is seen after colours that last so many milliseconds each.
+    fn seen(colours: &[(&str, u64)]) -> String {
+        let time = HandTime::take();
+        let record = LightRecord::default();
+        for (name, milliseconds) in colours {
+            let level = |part: bool| if part { 64 } else { 0 };
+            let [red, green, blue] = Hue::named(name).unwrap().0.map(level);
+            record.show(Colour { red, green, blue });
+            time.go_on_to(Instant::now() + Duration::from_millis(*milliseconds));
+        }
+        record
+            .pattern()
+            .map_or("?".into(), |pattern| pattern.to_string())
+    }
+
+    #[test]
+    fn patterns_are_what_a_person_sees() {
+        for (colours, pattern) in [
+            (&[("blue", 1000)][..], "blue"),
+            (&[("blue", 999)], "?"),
+            (&[("red", 500), ("dark", 500), ("red", 0)], "red flashing"),
+            (&[("red", 500), ("dark", 500), ("red", 500)], "red flashing"),
+            (&[("red", 500), ("dark", 500), ("red", 700)], "?"),
+            (&[("red", 500), ("dark", 500)], "?"),
+            (&[("red", 500), ("dark", 100), ("red", 0)], "?"),
+            (&[("red", 500), ("dark", 500), ("blue", 0)], "?"),
+            (
+                &[("red", 250), ("dark", 250), ("red", 0)],
+                "red flashing fast",
+            ),
+            (
+                &[("white", 500), ("red", 500), ("white", 0)],
+                "red and white in turn",
+            ),
+            (
+                &[("red", 500), ("white", 500), ("red", 0)],
+                "red and white in turn",
+            ),
+        ] {
+            assert_eq!(seen(colours), pattern, "{colours:?}");
+        }
+    }
+
+    #[test]
+    fn colours_are_told_by_their_strongest_parts() {
+        let hue = |red, green, blue| Hue::of(Colour { red, green, blue }).to_string();
+        assert_eq!(hue(0, 0, 0), "dark");
+        assert_eq!(hue(1, 0, 0), "red");
+        assert_eq!(hue(40, 40, 40), "white");
+        assert_eq!(hue(255, 10, 10), "red");
+        assert_eq!(hue(200, 180, 0), "yellow");
+    }
+}

@@ -134,6 +134,14 @@ impl Board {
         self.power.is_on() && (joined || own)
     }
 
+    /// Whether a move is under way, or waits.
+    pub fn arm_is_busy(&self) -> bool {
+        let house = self.house.borrow();
+        house
+            .as_ref()
+            .is_some_and(|house| house.arm.with(|arm| arm.is_busy()))
+    }
+
     /// What a restart would find in memory.
     pub fn remembered(&self) -> Settings {
         firmware_tasks::remembered(&self.cells.borrow())

@@ -93,3 +93,43 @@ impl Tasks {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_futures::yield_now;
+
+    #[test]
+    fn tasks_take_turns_in_the_order_in_which_they_are_woken() {
+        let mut tasks = Tasks::default();
+        let said = Rc::new(RefCell::new(String::new()));
+        for name in ['a', 'b'] {
+            let (said, spawner) = (said.clone(), tasks.spawner());
+            tasks.spawner().spawn(async move {
+                for _ in 0..2 {
+                    said.borrow_mut().push(name);
+                    yield_now().await;
+                }
+                let later = said.clone();
+                spawner.spawn(async move { later.borrow_mut().push('+') });
+            });
+        }
+        while tasks.poll_one() {}
+        assert_eq!(*said.borrow(), "abab++");
+    }
+
+    #[test]
+    fn they_are_dropped_where_they_stand() {
+        let mut tasks = Tasks::default();
+        let held = Rc::new(());
+        let inside = held.clone();
+        tasks.spawner().spawn(async move {
+            std::future::pending::<()>().await;
+            drop(inside);
+        });
+        assert!(tasks.poll_one());
+        assert!(!tasks.poll_one());
+        drop(tasks);
+        assert_eq!(Rc::strong_count(&held), 1);
+    }
+}

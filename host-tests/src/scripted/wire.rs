@@ -150,3 +150,83 @@ impl Wire {
         self.wakers.drain(..).for_each(Waker::wake);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use firmware::boards::desktop::clock::HandTime;
+
+    #[test]
+    fn windows_hold_the_sender_back() {
+        let _time = HandTime::take();
+        let mut wire = Wire::new();
+        wire.unsent.extend([7; WINDOW + 10]);
+        wire.pass(true);
+        assert_eq!((wire.arrived.len(), wire.unsent.len()), (WINDOW, 10));
+        wire.arrived.clear();
+        wire.pass(true);
+        assert_eq!((wire.arrived.len(), wire.unsent.len()), (10, 0));
+        wire.client_reads = false;
+        wire.outgoing.extend([7; WINDOW]);
+        assert_eq!(wire.pass(true).len(), 0);
+        assert_eq!(wire.room(), 0);
+        wire.client_reads = true;
+        assert_eq!(wire.pass(true).len(), WINDOW);
+        assert_eq!(wire.room(), WINDOW);
+    }
+
+    #[test]
+    fn what_was_sent_before_the_end_arrives_before_it() {
+        let _time = HandTime::take();
+        let mut wire = Wire::new();
+        wire.unsent.extend([7; WINDOW + 1]);
+        wire.client_finishes = true;
+        wire.pass(true);
+        assert_eq!(wire.machine_sees, None);
+        wire.arrived.clear();
+        wire.pass(true);
+        assert_eq!(
+            (wire.arrived.len(), wire.machine_sees),
+            (1, Some(End::Closed))
+        );
+    }
+
+    #[test]
+    fn a_silence_of_20_s_ends_it_for_both() {
+        let time = HandTime::take();
+        let mut wire = Wire::new();
+        wire.unsent.extend([7]);
+        for (at, ended) in [(0, false), (19, false), (20, true)] {
+            time.go_on_to(Instant::from_secs(at));
+            wire.pass(false);
+            assert_eq!(wire.machine_sees.is_some(), ended, "{at}");
+            assert_eq!(wire.client_sees.is_some(), ended, "{at}");
+        }
+        // A shorter one delays only.
+        let mut wire = Wire::new();
+        wire.unsent.extend([7]);
+        wire.pass(false);
+        time.go_on_to(Instant::from_secs(39));
+        wire.pass(true);
+        time.go_on_to(Instant::from_secs(41));
+        wire.pass(false);
+        assert_eq!((wire.arrived.len(), wire.machine_sees), (1, None));
+    }
+
+    #[test]
+    fn a_machine_that_forgets_resets_unless_it_has_closed() {
+        let _time = HandTime::take();
+        for (finished, failed, end) in [
+            (false, false, End::Reset),
+            (true, false, End::Closed),
+            (false, true, End::Lost),
+        ] {
+            let mut wire = Wire::new();
+            wire.machine_forgets = true;
+            wire.machine_finishes = finished;
+            wire.power_failed = failed;
+            wire.pass(true);
+            assert_eq!(wire.client_sees, Some(end));
+        }
+    }
+}

@@ -209,3 +209,48 @@ impl Drop for HandTime {
         HAND.set(None);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_time::{Duration, Instant, Timer};
+    use std::pin::pin;
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicUsize;
+    use std::task::{Context, Wake};
+
+    struct Count(AtomicUsize);
+
+    impl Wake for Count {
+        fn wake(self: Arc<Self>) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    #[test]
+    fn time_in_hand_stands_still_unless_it_is_moved() {
+        let hand = HandTime::take();
+        assert_eq!(Instant::now(), Instant::MIN);
+        let woken = Arc::new(Count(AtomicUsize::new(0)));
+        let waker = Waker::from(woken.clone());
+        let mut context = Context::from_waker(&waker);
+        let mut timer = pin!(Timer::after(Duration::from_secs(5)));
+        assert!(timer.as_mut().poll(&mut context).is_pending());
+        assert_eq!(hand.next_alarm(), Some(Instant::from_secs(5)));
+        hand.go_on_to(Instant::from_secs(4));
+        assert_eq!(woken.0.load(Ordering::Relaxed), 0);
+        hand.go_on_to(Instant::from_secs(5));
+        assert_eq!(woken.0.load(Ordering::Relaxed), 1);
+        assert!(timer.as_mut().poll(&mut context).is_ready());
+        assert_eq!(hand.next_alarm(), None);
+        hand.go_on_to(Instant::from_secs(1));
+        assert_eq!(Instant::now(), Instant::from_secs(5));
+        // Another thread has its own.
+        std::thread::spawn(|| {
+            let _hand = HandTime::take();
+            assert_eq!(Instant::now(), Instant::MIN);
+        })
+        .join()
+        .unwrap();
+    }
+}
