@@ -18,8 +18,9 @@ use heapless::Deque;
 /// Clients that may be connected at once; the next one is told so and closed.
 pub const MAX_CLIENTS: usize = 4;
 
-/// Everybody who may ask something of the arm: network clients, the serial port, the firmware itself.
-pub const MAX_ASKERS: usize = MAX_CLIENTS + 2;
+/// Everybody who may ask something of the arm: network clients, the serial port, the firmware itself, a
+/// drawing from memory.
+pub const MAX_ASKERS: usize = MAX_CLIENTS + 3;
 
 /// One of those who may ask something of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +31,8 @@ impl Client {
     pub const SERIAL: Self = Self(MAX_CLIENTS as u8);
     /// The firmware itself: waves, and settings that nobody on a connection asked to store.
     pub const HOUSE: Self = Self(MAX_CLIENTS as u8 + 1);
+    /// A drawing from memory.
+    pub const DRAWER: Self = Self(MAX_CLIENTS as u8 + 2);
 
     /// The network client in a slot, `None` beyond [`MAX_CLIENTS`].
     pub const fn new(slot: u8) -> Option<Self> {

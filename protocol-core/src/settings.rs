@@ -6,6 +6,7 @@ mod record;
 pub use record::MAX_RECORD;
 
 use crate::arm::Calibration;
+use crate::drawings::ButtonDraws;
 use crate::wifi::Networks;
 use heapless::String;
 
@@ -125,10 +126,12 @@ pub struct Settings {
     pub access_point: AccessPointName,
     /// Whether it makes its little waves (M291).
     pub waves: bool,
+    /// What a short press of its button draws (M23).
+    pub button: ButtonDraws,
 }
 
 impl Default for Settings {
-    /// `line-us`, no calibration, no network, a station that waves.
+    /// `line-us`, no calibration, no network, a station that waves, and a button that draws the next drawing.
     fn default() -> Self {
         Self {
             name: MachineName::default(),
@@ -137,6 +140,7 @@ impl Default for Settings {
             start: StartMode::default(),
             access_point: AccessPointName::default(),
             waves: true,
+            button: ButtonDraws::default(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! A line becomes a typed command here, once; nothing downstream sees text.
 
 use super::refusal::Refusal;
+use crate::drawings::{ButtonDraws, MAX_DRAWINGS, Replay, Slot};
 use crate::machine::Manner;
 use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
 use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
@@ -74,6 +75,28 @@ pub enum Command {
     Forget(Ssid),
     /// `M588 S*`.
     ForgetAll,
+    /// M20.
+    Drawings,
+    /// M39.
+    Space,
+    /// M23.
+    Button,
+    /// `M23 S`, `M23 S2 K`.
+    SetButton(ButtonDraws),
+    /// `M23 K`.
+    Draw(Slot),
+    /// `M23 K0`.
+    StopDrawing,
+    /// `M28 S`.
+    Record(Slot),
+    /// M29.
+    EndRecording,
+    /// `M30 S`.
+    Delete(Slot),
+    /// M85.
+    Replaying,
+    /// `M85 S P K`; `M85 S0` for `None`.
+    SetReplay(Option<Replay>),
 }
 
 /// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
@@ -120,6 +143,13 @@ fn other_than_a_move<'a>(
         (b'G', 28) => without_parameters(&mut words, Command::Home),
         (b'G', 54) => transform(&mut words),
         (b'G', 94) => speed(&mut words),
+        (b'M', 20) => without_parameters(&mut words, Command::Drawings),
+        (b'M', 23) => button(&mut words),
+        (b'M', 28) => Ok(Command::Record(one_slot(&mut words)?)),
+        (b'M', 29) => without_parameters(&mut words, Command::EndRecording),
+        (b'M', 30) => Ok(Command::Delete(one_slot(&mut words)?)),
+        (b'M', 39) => without_parameters(&mut words, Command::Space),
+        (b'M', 85) => replay(&mut words),
         (b'M', 114) => position(&mut words),
         (b'M', 115) => without_parameters(&mut words, Command::Capabilities),
         (b'M', 122) => without_parameters(&mut words, Command::Diagnostics),
@@ -325,6 +355,101 @@ fn network_name<'a>(words: &mut Words<'a>) -> Result<Ssid, Refusal<'a>> {
     text.unescape::<MAX_SSID>()
         .and_then(|name| Ssid::new(&name))
         .ok_or(Refusal::BadText('S', text.raw(), "1 to 32 bytes"))
+}
+
+fn button<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    let mut letters = Letters::default();
+    let (mut number, mut place) = (None, None);
+    while let Some(letter) = words.letter()? {
+        letters.once(letter)?;
+        match letter {
+            'S' => number = Some(whole(words, letter, 0, 3)? as u8),
+            'K' => place = Some(whole(words, letter, 0, MAX_DRAWINGS.into())? as u8),
+            _ => return Err(Refusal::UnknownParameter(letter)),
+        }
+    }
+    let Some(number) = number else {
+        return Ok(match place.map(Slot::new) {
+            None => Command::Button,
+            Some(Some(slot)) => Command::Draw(slot),
+            Some(None) => Command::StopDrawing,
+        });
+    };
+    match (ButtonDraws::new(number, place.and_then(Slot::new)), place) {
+        (Some(choice), _) => Ok(Command::SetButton(choice)),
+        (None, None) => Err(Refusal::Missing('K')),
+        (None, Some(0)) => Err(Refusal::NotWhole {
+            letter: 'K',
+            least: 1,
+            most: MAX_DRAWINGS.into(),
+        }),
+        (None, Some(_)) => Err(Refusal::OnlyWith('K', "S2")),
+    }
+}
+
+/// `S` with a slot, and nothing more.
+fn one_slot<'a>(words: &mut Words<'a>) -> Result<Slot, Refusal<'a>> {
+    match words.letter()? {
+        None => return Err(Refusal::Missing('S')),
+        Some('S') => {}
+        Some(letter) => return Err(Refusal::UnknownParameter(letter)),
+    }
+    let slot = slot(words, 'S')?;
+    match words.letter()? {
+        None => Ok(slot),
+        Some('S') => Err(Refusal::Repeated('S')),
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn slot<'a>(words: &mut Words<'a>, letter: char) -> Result<Slot, Refusal<'a>> {
+    let number = whole(words, letter, 1, MAX_DRAWINGS.into())?;
+    Ok(Slot::new(number as u8).unwrap_or(Slot::FIRST))
+}
+
+fn replay<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    let mut letters = Letters::default();
+    let (mut seconds, mut every, mut place) = (None, None, None);
+    while let Some(letter) = words.letter()? {
+        letters.once(letter)?;
+        match letter {
+            'S' => seconds = Some(whole(words, letter, 0, Replay::MAX_SECONDS)?),
+            'P' => every = Some(whole(words, letter, 1, Replay::MAX_SECONDS)?),
+            'K' => place = Some(slot(words, letter)?),
+            _ => return Err(Refusal::UnknownParameter(letter)),
+        }
+    }
+    Ok(match (seconds, every, place) {
+        (None, None, None) => Command::Replaying,
+        (Some(0), ..) => Command::SetReplay(None),
+        _ => Command::SetReplay(Some(Replay {
+            slot: place.unwrap_or(Slot::FIRST),
+            seconds: seconds.unwrap_or(Replay::DEFAULT_SECONDS),
+            every: every.unwrap_or(Replay::DEFAULT_EVERY),
+        })),
+    })
+}
+
+/// A whole number from `least` to `most`.
+fn whole<'a>(
+    words: &mut Words<'a>,
+    letter: char,
+    least: u16,
+    most: u16,
+) -> Result<u16, Refusal<'a>> {
+    const BITS: u32 = 16;
+    let value = words.fixed(letter, BITS, most.into())?;
+    let number = value
+        .ok()
+        .filter(|bits| bits % (1 << BITS) == 0)
+        .and_then(|bits| u16::try_from(bits >> BITS).ok());
+    number
+        .filter(|number| (least..=most).contains(number))
+        .ok_or(Refusal::NotWhole {
+            letter,
+            least,
+            most,
+        })
 }
 
 /// A whole number from 1 to `most`.

@@ -2,6 +2,7 @@
 //! (specification 1.0.4a with `reference/line-us.md`).
 
 mod command;
+mod recording;
 mod refusal;
 mod reply;
 mod session;

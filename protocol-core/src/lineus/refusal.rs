@@ -1,5 +1,6 @@
 //! Why a line is refused, and the one place where that becomes text.
 
+use crate::drawings::Slot;
 use crate::settings::MAX_NAME;
 use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt, excerpt_of_bytes};
 use crate::wifi::{MAX_NETWORKS, MAX_PASSWORD, MIN_PASSWORD};
@@ -33,6 +34,21 @@ pub enum Refusal<'a> {
     ZeroScale,
     /// Not one of the whole numbers from 1 to this one.
     NoChoice(char, u8),
+    /// Not one of the whole numbers from the first to the second.
+    NotWhole {
+        /// The parameter's letter.
+        letter: char,
+        /// Least value.
+        least: u16,
+        /// Largest value.
+        most: u16,
+    },
+    /// A letter that goes with another parameter only.
+    OnlyWith(char, &'static str),
+    /// A command that has no place in a drawing that is recorded.
+    NotRecorded(&'a str),
+    /// No drawing is in this slot.
+    NoSuchDrawing(Slot),
     /// A text that the parameter cannot have, and what it may be.
     BadText(char, &'a [u8], &'static str),
     /// A password of a length that none has; what it is stays a secret.
@@ -78,6 +94,16 @@ impl fmt::Display for Refusal<'_> {
             Self::NoChoice(letter, most) => {
                 write!(out, "{letter} must be a whole number, 1 to {most}")
             }
+            Self::NotWhole {
+                letter,
+                least,
+                most,
+            } => write!(out, "{letter} must be a whole number, {least} to {most}"),
+            Self::OnlyWith(letter, other) => write!(out, "{letter} goes with {other} only"),
+            Self::NotRecorded(code) => {
+                write!(out, "{} cannot be part of a drawing", short(code))
+            }
+            Self::NoSuchDrawing(slot) => write!(out, "no drawing {} is stored", slot.number()),
             Self::ZeroScale => out.write_str("S must not be zero"),
             Self::BadText(letter, text, expected) => {
                 write!(

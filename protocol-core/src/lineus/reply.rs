@@ -2,6 +2,7 @@
 
 use super::refusal::Refusal;
 use crate::arm::{Angles, Calibration};
+use crate::drawings::{ButtonDraws, Contents, MAX_DRAWINGS, Replay, Space};
 use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
 use crate::settings::{MachineName, Settings};
@@ -18,6 +19,11 @@ pub const TERMINATOR: &str = "\r\n\0";
 pub const MAX_REPLY: usize = 768;
 const _: () = assert!(
     "ok ".len() + MAX_NETWORKS * (" \"\":1".len() + 2 * MAX_SSID) + TERMINATOR.len() <= MAX_REPLY
+);
+// A list of drawings fits as well: `/0000001.txt-` and at most ten digits for each.
+const _: () = assert!(
+    "ok FS:\"\"".len() + MAX_DRAWINGS as usize * "/0000001.txt-1474560;".len() + TERMINATOR.len()
+        <= MAX_REPLY
 );
 /// Version in the greeting: the level of the original's protocol that is complete, then our own.
 pub const VERSION: &str = concat!("1.0.4 Quill ", env!("CARGO_PKG_VERSION"));
@@ -63,6 +69,8 @@ pub struct Diagnostics<'a> {
     pub reset_reason: &'a str,
     /// How the memory for the settings is.
     pub memory: &'a str,
+    /// Room for drawings.
+    pub space: Space,
     /// The last words of a firmware that panicked before, if there are any.
     pub last_panic: &'a str,
 }
@@ -210,6 +218,48 @@ impl Reply {
         self.push(TERMINATOR);
     }
 
+    /// Drawings, as files: name and bytes (`reference/line-us.md`, section 5, M20).
+    pub fn drawings(&mut self, contents: &Contents) {
+        self.compose(format_args!("ok FS:\"{}\"", Files(contents)));
+    }
+
+    /// Room for drawings (`reference/line-us.md`, section 5, M39).
+    pub fn space(&mut self, space: Space) {
+        self.compose(format_args!(
+            "ok FSUsed:{} FSTotal:{} FSFree:{} FSPercent:{}",
+            space.used,
+            space.total,
+            space.free(),
+            space.percent()
+        ));
+    }
+
+    /// What the button draws.
+    pub fn button(&mut self, choice: ButtonDraws) {
+        let number = choice.number();
+        match choice.slot() {
+            Some(slot) => self.compose(format_args!("ok S:{number} K:{}", slot.number())),
+            None => self.compose(format_args!("ok S:{number}")),
+        }
+    }
+
+    /// What is replayed.
+    pub fn replay(&mut self, replay: Option<Replay>) {
+        match replay {
+            Some(Replay {
+                slot,
+                seconds,
+                every,
+            }) => self.compose(format_args!("ok S:{seconds} P:{every} K:{}", slot.number())),
+            None => self.compose(format_args!("ok S:0")),
+        }
+    }
+
+    /// Done, and something to know about it.
+    pub fn ok_with(&mut self, info: fmt::Arguments<'_>) {
+        self.compose(format_args!("ok INFO:\"{info}\""));
+    }
+
     fn push_entry(&mut self, ssid: &Ssid, state: char) {
         if !self.text.ends_with(b" ") {
             self.push(" ");
@@ -233,7 +283,7 @@ impl Reply {
             "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
              WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
-             Memory:\"{}\"{}",
+             Memory:\"{}\" FSUsed:{} FSTotal:{} FSFree:{}{}",
             state.name.as_str(),
             state.identity.serial(),
             Uptime(state.uptime),
@@ -246,6 +296,9 @@ impl Reply {
             state.free_memory,
             state.reset_reason,
             state.memory,
+            state.space.used,
+            state.space.total,
+            state.space.free(),
             LastPanic(state.last_panic),
         ));
     }
@@ -364,6 +417,17 @@ impl fmt::Display for InWords<'_> {
             Joined::Unfit => out.write_str("WPA3 only, or no password"),
             Joined::Failed(reason) => write!(out, "not joined, reason {reason}"),
         }
+    }
+}
+
+/// Drawings as files in a list.
+struct Files<'a>(&'a Contents);
+
+impl fmt::Display for Files<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0
+            .iter()
+            .try_for_each(|(slot, bytes)| write!(out, "/{:07}.txt-{bytes};", slot.number()))
     }
 }
 
@@ -607,12 +671,17 @@ mod tests {
                 free_memory: u32::MAX,
                 reset_reason: "the watchdog bit after a long silence",
                 memory: "worn out, and what is worse, it does not take what is stored",
+                space: Space {
+                    total: u32::MAX,
+                    used: 1_234_567_890,
+                },
                 last_panic: &"panicked at \"somewhere\"\n".repeat(9),
             });
         });
         assert!(
-            text.contains("stored\" LastPanic:\"panicked at 'somewhere'?")
-                && text.ends_with("...\""),
+            text.contains(
+                " FSTotal:4294967295 FSFree:3060399405 LastPanic:\"panicked at 'somewhere'?"
+            ) && text.ends_with("...\""),
             "{text}"
         );
         // Outside quotes, blanks separate tokens.
@@ -621,6 +690,58 @@ mod tests {
         assert_eq!(tokens.next(), Some("ok"));
         assert!(tokens.clone().count() >= 9);
         assert!(tokens.all(|token| token.contains(':')), "{text}");
+    }
+
+    #[test]
+    fn drawings_as_the_original_lists_them() {
+        let mut contents = Contents::EMPTY;
+        assert_eq!(said(|reply| reply.drawings(&contents)), "ok FS:\"\"");
+        let slot = |number| crate::drawings::Slot::new(number).unwrap();
+        contents.set(slot(1), Some(9496));
+        contents.set(slot(2), Some(11323));
+        assert_eq!(
+            said(|reply| reply.drawings(&contents)),
+            "ok FS:\"/0000001.txt-9496;/0000002.txt-11323;\""
+        );
+        // As many as there can be, each far longer than they can be together.
+        for slot in crate::drawings::Slot::all() {
+            contents.set(slot, Some(1_474_560));
+        }
+        let list = said(|reply| reply.drawings(&contents));
+        assert!(list.ends_with("/0000032.txt-1474560;\""), "{list}");
+        assert_eq!(list.matches(';').count(), 32);
+    }
+
+    #[test]
+    fn room_as_the_original_tells_it() {
+        let space = Space {
+            total: 1_562_625,
+            used: 356_922,
+        };
+        assert_eq!(
+            said(|reply| reply.space(space)),
+            "ok FSUsed:356922 FSTotal:1562625 FSFree:1205703 FSPercent:22"
+        );
+    }
+
+    #[test]
+    fn button_and_replay() {
+        let slot = crate::drawings::Slot::new(5).unwrap();
+        assert_eq!(said(|reply| reply.button(ButtonDraws::Next)), "ok S:1");
+        assert_eq!(
+            said(|reply| reply.button(ButtonDraws::Always(slot))),
+            "ok S:2 K:5"
+        );
+        assert_eq!(said(|reply| reply.replay(None)), "ok S:0");
+        let replay = Replay {
+            slot,
+            seconds: 20,
+            every: 600,
+        };
+        assert_eq!(
+            said(|reply| reply.replay(Some(replay))),
+            "ok S:20 P:600 K:5"
+        );
     }
 
     #[test]

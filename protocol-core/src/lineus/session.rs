@@ -1,13 +1,16 @@
 //! One connection: its bytes become requests, one reply each, in order.
 
 use super::command::{Command, parse};
+use super::recording;
 use super::refusal::Refusal;
 use super::reply::Reply;
+use crate::drawings::{ButtonDraws, Replay, Slot};
 use crate::machine::{Errand, Manner, Target};
 use crate::motion::{StepSize, Transform, WideCoordinate};
 use crate::settings::{AccessPointName, MachineName, StartMode};
-use crate::text::LineBuffer;
+use crate::text::{LineBuffer, MAX_LINE};
 use crate::wifi::{Password, Ssid};
+use heapless::Vec;
 
 /// What a line asks for, in arm coordinates; each is answered by exactly one reply.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,13 +69,41 @@ pub enum Request {
     Forget(Ssid),
     /// Every network is to be forgotten; answered by [`Reply::ok`].
     ForgetAll,
+    /// To be answered by [`Reply::drawings`].
+    Drawings,
+    /// To be answered by [`Reply::space`].
+    Space,
+    /// To be answered by [`Reply::button`].
+    Button,
+    /// To be remembered, and answered by [`Reply::ok`].
+    SetButton(ButtonDraws),
+    /// To be drawn from memory, and answered by [`Reply::ok`] when it begins.
+    Draw(Slot),
+    /// What is drawn from memory is to end, if anything is.
+    StopDrawing,
+    /// To be answered by [`Reply::ok`], and [`Session::record`] told when that is possible.
+    BeginRecording(Slot),
+    /// [`Session::recorded_line`] is to be kept, and answered by [`Reply::ok`].
+    RecordLine,
+    /// What was recorded is to become a drawing; [`Session::record`] is told. Comes when nothing is recorded
+    /// as well.
+    EndRecording,
+    /// To be deleted, and answered by [`Reply::ok`].
+    Delete(Slot),
+    /// To be answered by [`Reply::replay`].
+    Replaying,
+    /// To be answered by [`Reply::ok`].
+    SetReplay(Option<Replay>),
 }
 
-/// What belongs to one connection: the line being received, scale and origin.
+/// What belongs to one connection: the line being received, scale and origin, and whether what comes is
+/// recorded instead of drawn.
 #[derive(Debug)]
 pub struct Session {
     lines: LineBuffer,
     transform: Transform,
+    recording: bool,
+    recorded: Vec<u8, MAX_LINE>,
 }
 
 impl Default for Session {
@@ -87,7 +118,24 @@ impl Session {
         Self {
             lines: LineBuffer::new(),
             transform: Transform::IDENTITY,
+            recording: false,
+            recorded: Vec::new(),
         }
+    }
+
+    /// From now on, lines are recorded, or no longer.
+    pub const fn record(&mut self, on: bool) {
+        self.recording = on;
+    }
+
+    /// Whether lines are recorded.
+    pub const fn is_recording(&self) -> bool {
+        self.recording
+    }
+
+    /// The line of the last [`Request::RecordLine`], as it was sent, without its terminator.
+    pub fn recorded_line(&self) -> &[u8] {
+        &self.recorded
     }
 
     /// Takes bytes off the front of `input` up to the end of the next line, and gives what it asks
@@ -95,6 +143,9 @@ impl Session {
     /// in `reply`.
     pub fn next_request(&mut self, input: &mut &[u8], reply: &mut Reply) -> Option<Request> {
         let line = self.lines.next_line(input)?;
+        if self.recording {
+            return Some(recording::request(line, &mut self.recorded, reply));
+        }
         Some(match line.map_err(Refusal::from).and_then(parse) {
             // By reference: commands are large, and copying one costs as much as reading it.
             Ok(command) => request(&mut self.transform, &command, reply),
@@ -107,7 +158,11 @@ impl Session {
 }
 
 #[inline]
-fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Reply) -> Request {
+pub(super) fn request(
+    scale_and_origin: &mut Transform,
+    command: &Command,
+    reply: &mut Reply,
+) -> Request {
     match command {
         Command::Move(manner, axes) => {
             let [x, y, z] = axes.to_array();
@@ -159,6 +214,17 @@ fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Repl
         },
         Command::Forget(ssid) => Request::Forget(ssid.clone()),
         Command::ForgetAll => Request::ForgetAll,
+        Command::Drawings => Request::Drawings,
+        Command::Space => Request::Space,
+        Command::Button => Request::Button,
+        Command::SetButton(choice) => Request::SetButton(*choice),
+        Command::Draw(slot) => Request::Draw(*slot),
+        Command::StopDrawing => Request::StopDrawing,
+        Command::Record(slot) => Request::BeginRecording(*slot),
+        Command::EndRecording => Request::EndRecording,
+        Command::Delete(slot) => Request::Delete(*slot),
+        Command::Replaying => Request::Replaying,
+        Command::SetReplay(replay) => Request::SetReplay(*replay),
     }
 }
 
@@ -421,6 +487,68 @@ mod tests {
             ("M291 S2", Request::SetWaves(false)),
         ] {
             assert_eq!(only(line).0, request, "{line}");
+        }
+    }
+
+    #[test]
+    fn stored_drawings() {
+        let slot = |number| Slot::new(number).unwrap();
+        let replay = |seconds, every, number| {
+            Request::SetReplay(Some(Replay {
+                slot: slot(number),
+                seconds,
+                every,
+            }))
+        };
+        for (line, request) in [
+            ("M20", Request::Drawings),
+            ("M39 ", Request::Space),
+            ("M23", Request::Button),
+            ("M23 S0", Request::SetButton(ButtonDraws::Nothing)),
+            ("M23 S1", Request::SetButton(ButtonDraws::Next)),
+            (
+                "m23 k7 s2",
+                Request::SetButton(ButtonDraws::Always(slot(7))),
+            ),
+            ("M23 S3", Request::SetButton(ButtonDraws::Any)),
+            ("M23 K7", Request::Draw(slot(7))),
+            ("M23 K0", Request::StopDrawing),
+            ("M28 S1", Request::BeginRecording(slot(1))),
+            ("M28 S32", Request::BeginRecording(slot(32))),
+            ("M29", Request::EndRecording),
+            ("M30 S5", Request::Delete(slot(5))),
+            ("M85", Request::Replaying),
+            ("M85 S0", Request::SetReplay(None)),
+            ("M85 S20 P600 K3", replay(20, 600, 3)),
+            ("M85 S20", replay(20, Replay::DEFAULT_EVERY, 1)),
+            ("M85 K2", replay(30, Replay::DEFAULT_EVERY, 2)),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
+        }
+        for (line, reason) in [
+            ("M20 S1", "unknown parameter S"),
+            ("M23 S4", "S must be a whole number, 0 to 3"),
+            ("M23 S2", "parameter K is missing"),
+            ("M23 S2 K0", "K must be a whole number, 1 to 32"),
+            ("M23 K33", "K must be a whole number, 0 to 32"),
+            ("M23 S1 K3", "K goes with S2 only"),
+            ("M23 S1 S1", "parameter S is repeated"),
+            ("M28", "parameter S is missing"),
+            ("M28 S0", "S must be a whole number, 1 to 32"),
+            ("M28 S33", "S must be a whole number, 1 to 32"),
+            ("M28 S-1", "S must be a whole number, 1 to 32"),
+            ("M28 S1.5", "S must be a whole number, 1 to 32"),
+            ("M28 S", "S has no number"),
+            ("M28 K1", "unknown parameter K"),
+            ("M28 S1 S2", "parameter S is repeated"),
+            ("M30 S1e9", "S must be a whole number, 1 to 32"),
+            ("M30 S1 P1", "unknown parameter P"),
+            ("M85 S3601", "S must be a whole number, 0 to 3600"),
+            ("M85 S5 P0", "P must be a whole number, 1 to 3600"),
+            ("M85 S5 K0", "K must be a whole number, 1 to 32"),
+        ] {
+            let refused = std::format!("error INFO:\"{reason}\"");
+            assert_eq!(only(line), (Request::Answered, refused), "{line}");
         }
     }
 

@@ -39,6 +39,8 @@ pub enum Event<'a> {
     Elapsed,
     /// The button.
     Press(Gesture),
+    /// A short press of the button, and there is a drawing for it to draw.
+    PressToDraw,
     /// A client of the own network wants this network to be tried (`spec 1.0.4a, M587`).
     Try(Network),
     /// The remembered networks have changed (M587, M588).
@@ -71,6 +73,8 @@ pub enum Effect {
     Remember(Network),
     /// Confirm the press of the button.
     Confirm,
+    /// The press was for the drawing: the network stays as it is.
+    Draw,
 }
 
 /// What a person or a program is told about the network.
@@ -228,6 +232,7 @@ impl Policy {
                 _ => {}
             },
             Event::Press(Gesture::Short) => return self.short_press(settings),
+            Event::PressToDraw => return self.press_to_draw(settings),
             Event::Press(Gesture::Long) => return self.long_press(settings),
             Event::Press(_) => {}
             Event::Try(network) => {
@@ -377,6 +382,20 @@ impl Policy {
             }
         }
         Some(Effect::Confirm)
+    }
+
+    /// Where the network waits for nothing, a press is for the drawing (`reference/line-us.md`, section 6).
+    fn press_to_draw(&mut self, settings: &Settings) -> Option<Effect> {
+        match &self.state {
+            State::Connected(_)
+            | State::LookingAround
+            | State::Opening(_)
+            | State::Hosting
+            | State::Failed(_) => Some(Effect::Draw),
+            State::Listening | State::Joining(_) | State::Waiting(_) | State::Trying(_) => {
+                self.short_press(settings)
+            }
+        }
     }
 
     /// The networks as they are remembered, beginning after the one that is being tried.

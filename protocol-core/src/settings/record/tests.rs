@@ -2,6 +2,7 @@ extern crate std;
 
 use super::*;
 use crate::arm::Angles;
+use crate::drawings::Slot;
 use crate::motion::Microdegrees;
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Networks, Password, Ssid};
 use proptest::array::uniform3;
@@ -29,7 +30,11 @@ fn networks() -> impl Strategy<Value = Networks> {
 }
 
 fn settings() -> impl Strategy<Value = Settings> {
-    let numbers = (1..=4u8, 1..=2u8, any::<bool>());
+    let button = any::<[u8; 2]>().prop_map(|[number, slot]| {
+        let choice = ButtonDraws::from_bytes([number % 4, slot % 33]);
+        choice.unwrap_or_default()
+    });
+    let numbers = (1..=4u8, 1..=2u8, any::<bool>(), button);
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
@@ -37,7 +42,7 @@ fn settings() -> impl Strategy<Value = Settings> {
         numbers,
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves))| Settings {
+            |(name, offsets, networks, (start, access_point, waves, button))| Settings {
                 name: MachineName::new(&name).unwrap(),
                 calibration: Calibration {
                     offsets: Angles::from_array(offsets.map(Microdegrees::new)),
@@ -46,6 +51,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 start: StartMode::from_number(start).unwrap(),
                 access_point: AccessPointName::from_number(access_point).unwrap(),
                 waves,
+                button,
             },
         )
 }
@@ -97,7 +103,7 @@ proptest! {
     #[test]
     fn tags_of_later_firmware_are_skipped(
         settings in settings(),
-        tag in 7..=255u8,
+        tag in 100..=255u8,
         value in vec(any::<u8>(), 0..=255),
         place: prop::sample::Index,
     ) {
@@ -135,7 +141,8 @@ fn the_bytes_of_a_record() {
         \x03\x05\x04open\
         \x04\x01\x04\
         \x05\x01\x02\
-        \x06\x01\x00";
+        \x06\x01\x00\
+        \x10\x02\x02\x07";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -150,6 +157,7 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.start, StartMode::StationLongPress);
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
+    assert_eq!(settings.button, ButtonDraws::Always(Slot::new(7).unwrap()));
 }
 
 #[test]

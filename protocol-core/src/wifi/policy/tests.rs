@@ -203,6 +203,32 @@ fn presses_in_the_network_and_in_setup() {
 }
 
 #[test]
+fn with_a_drawing_to_draw_a_press_leaves_the_network_alone() {
+    let mut bench = Bench::connected(&["home"]);
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Draw));
+    assert_eq!(bench.job(), "stay");
+    let mut bench = Bench::hosting(settings(&["home"]));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Draw));
+    assert_eq!(bench.job(), "host");
+    let mut bench = Bench::new(settings(&[]));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Draw));
+    assert_eq!(bench.job(), "scan");
+}
+
+#[test]
+fn while_a_network_is_looked_for_a_press_is_about_that() {
+    let mut bench = Bench::new(settings(&["home", "work"]));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Confirm));
+    assert_eq!(bench.job(), "join home");
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Confirm));
+    assert_eq!(bench.job(), "join work");
+    let mut bench = Bench::hosting(settings(&[]));
+    bench.on(Event::Try(network("new")));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Confirm));
+    assert_eq!(bench.policy.lamp(), Lamp::Setup);
+}
+
+#[test]
 fn a_locked_access_point_ignores_the_long_press() {
     let mut locked = settings(&["home"]);
     locked.start = StartMode::AccessPointLocked;
@@ -346,7 +372,7 @@ fn forgetting_everything_starts_anew() {
 }
 
 fn any_event() -> impl Strategy<Value = u8> {
-    0..14u8
+    0..15u8
 }
 
 proptest! {
@@ -376,6 +402,7 @@ proptest! {
                 9 => Event::Press(Gesture::Short),
                 10 => Event::Press(Gesture::Long),
                 11 => Event::Try(network("new")),
+                14 => Event::PressToDraw,
                 12 => {
                     bench.settings.networks.clear();
                     Event::Changed
