@@ -2,6 +2,8 @@
 
 pub mod arm;
 pub mod dhcp;
+pub mod drawer;
+pub mod drawings;
 pub mod line_us;
 pub mod network;
 pub mod panel;
@@ -11,11 +13,14 @@ use crate::board::Vitals;
 use arm::Arm;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
+use drawer::Drawer;
+use drawings::Drawings;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Duration, Instant, Timer};
 use network::Wifi;
 use panel::Panel;
+use protocol_core::drawings::Slot;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, Machine};
 use protocol_core::motion::WAVE;
@@ -28,6 +33,10 @@ pub struct House {
     pub arm: Arm,
     /// Where settings go.
     pub store: Store,
+    /// The drawings that it keeps.
+    pub drawings: Drawings,
+    /// What is drawn of them.
+    pub drawer: Drawer,
     /// The network to be in.
     pub wifi: Wifi,
     /// Light and button.
@@ -47,6 +56,8 @@ impl House {
         Self {
             arm: Arm::new(Machine::new(data, settings.calibration)),
             store: Store::new(),
+            drawings: Drawings::new(),
+            drawer: Drawer::new(),
             wifi: Wifi::new(),
             panel: Panel::new(),
             identity,
@@ -95,7 +106,32 @@ impl House {
         let forget = |settings: &mut Settings| *settings = Settings::default();
         self.change(Client::HOUSE, forget).await?;
         self.wifi.restart();
+        self.drawer.set_replay(None);
+        self.drawer.stop();
+        for (slot, _) in self.drawings.contents().iter() {
+            let deleted = self.drawings.delete(slot, Client::HOUSE, &self.arm).await;
+            deleted.map_err(|_| StoreError)?;
+        }
         Ok(())
+    }
+
+    /// Which drawing a short press of the button draws now.
+    fn drawing_for_button(&self) -> Option<Slot> {
+        let choice = self.settings(|settings| settings.button);
+        // When somebody presses a button is as good as any dice.
+        let random = Instant::now().as_micros() as u32;
+        choice.choose(&self.drawings.contents(), self.drawer.last(), random)
+    }
+
+    /// Draws the drawing of the button, unless the arm has something else to do.
+    fn draw_by_button(&self) {
+        let idle = self.arm.with(|machine| machine.is_idle());
+        if let Some(slot) = self.drawing_for_button()
+            && idle
+        {
+            // Of two presses at once one is enough.
+            let _ = self.drawer.draw(slot);
+        }
     }
 
     /// Changes settings: waits until the arm rests, and keeps it at rest while the changed settings are

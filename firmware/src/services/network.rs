@@ -303,6 +303,9 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
 
     async fn take(&mut self, input: Input) {
         match input {
+            Input::Press(Gesture::Short) if self.house.drawing_for_button().is_some() => {
+                self.on(Event::PressToDraw);
+            }
             Input::Press(gesture) => self.on(Event::Press(gesture)),
             Input::Try(network) => {
                 Timer::after(GRACE).await;
@@ -332,6 +335,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
             Some(Effect::Confirm) => {
                 self.house.wave();
             }
+            Some(Effect::Draw) => self.house.draw_by_button(),
             None => {}
         }
     }

@@ -125,6 +125,8 @@ pub async fn watch(house: &House, mut pin: impl Wait + InputPin) -> ! {
 
 async fn act(house: &House, gesture: Gesture) {
     match gesture {
+        // Whatever the network is doing.
+        Gesture::Short if house.drawer.stop() => {}
         Gesture::Short | Gesture::Long => house.wifi.press(gesture),
         Gesture::ResetWarning => house.panel.show_first(Some(Lamp::ResetWarning)),
         Gesture::ResetCancelled => house.panel.show_first(None),

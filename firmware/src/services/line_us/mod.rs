@@ -4,9 +4,11 @@
 //! takes the next client, says so, and closes. What a slow client loses is its own replies.
 
 mod answers;
+mod drawings;
 mod perform;
 
 pub use answers::PATIENCE;
+pub(super) use perform::perform;
 
 use super::House;
 use crate::log::info;
@@ -20,7 +22,6 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
-use perform::perform;
 use protocol_core::lineus::{Reply, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 
@@ -121,7 +122,9 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     while let Ok(length @ 1..) = answers.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
-            perform(&request, &mut reply, client, house).await;
+            if !drawings::record(&request, &mut session, &mut reply, client, house).await {
+                perform(&request, &mut reply, client, house).await;
+            }
             answers.send(&reply).await;
         }
         // A client that sends faster than it is served would else keep everybody waiting.
@@ -129,5 +132,6 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
             yield_now().await;
         }
     }
+    house.drawings.abandon(client).await;
     house.arm.with(|machine| machine.client_gone(client));
 }

@@ -1,5 +1,6 @@
 //! What a line asks for is done here.
 
+use super::drawings;
 use crate::services::House;
 use core::fmt::Display;
 use protocol_core::lineus::{Diagnostics, Refusal, Reply, Request};
@@ -9,7 +10,12 @@ use protocol_core::settings::{MachineName, Settings};
 use protocol_core::wifi::{Full, Heard, MAX_NETWORKS, Network, Networks, Password, Ssid};
 
 /// Does what a line asks for, and puts the answer into `reply`.
-pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &House) {
+pub(in crate::services) async fn perform(
+    request: &Request,
+    reply: &mut Reply,
+    client: Client,
+    house: &House,
+) {
     let arm = &house.arm;
     match request {
         Request::Answered => {}
@@ -62,6 +68,24 @@ pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client
             change("networks", forget, reply, client, house).await;
             house.wifi.changed();
         }
+        Request::Drawings
+        | Request::Space
+        | Request::Draw(_)
+        | Request::StopDrawing
+        | Request::BeginRecording(_)
+        | Request::RecordLine
+        | Request::EndRecording
+        | Request::Delete(_)
+        | Request::Replaying
+        | Request::SetReplay(_) => drawings::perform(request, reply, client, house).await,
+        Request::Button => reply.button(house.settings(|settings| settings.button)),
+        Request::SetButton(choice) => {
+            let set = |settings: &mut Settings| {
+                settings.button = *choice;
+                Ok(())
+            };
+            change("choice", set, reply, client, house).await;
+        }
         Request::Calibrate => calibrate(true, reply, client, house).await,
         Request::ClearCalibration => calibrate(false, reply, client, house).await,
     }
@@ -82,6 +106,7 @@ fn diagnose(reply: &mut Reply, house: &House) {
         free_memory: (house.vitals.free_memory)(),
         reset_reason: house.vitals.reset_reason,
         memory: house.store.health().text(),
+        space: house.drawings.space(),
         last_panic: house.vitals.last_panic,
     });
 }
