@@ -2,6 +2,7 @@
 //! and real time: a line in, a reply out, and every set-point on record.
 
 use protocol_core::arm::Calibration;
+use protocol_core::drawings::{ButtonDraws, Contents, Space};
 use protocol_core::lineus::{Diagnostics, Identity, Reply, Request, Session};
 use protocol_core::machine::{ArmData, Client, Errand, MAX_CLIENTS, Machine, Report, SetPoint};
 use protocol_core::motion::{Micros, Steps};
@@ -187,6 +188,7 @@ impl Bench {
                 free_memory: 0,
                 reset_reason: "a test",
                 memory: "none",
+                space: Space::default(),
                 last_panic: "",
             }),
             Request::Name => reply.name(&self.name),
@@ -198,7 +200,20 @@ impl Bench {
             Request::Start => reply.start(&Settings::default()),
             Request::Waves => reply.waves(true),
             Request::Networks => reply.networks(&[], &Networks::new()),
-            Request::SetStart { .. }
+            // Nor are drawings that are kept.
+            Request::Drawings => reply.drawings(&Contents::EMPTY),
+            Request::Space => reply.space(Space::default()),
+            Request::Button => reply.button(ButtonDraws::default()),
+            Request::Replaying => reply.replay(None),
+            Request::SetButton(_)
+            | Request::Draw(_)
+            | Request::StopDrawing
+            | Request::BeginRecording(_)
+            | Request::RecordLine
+            | Request::EndRecording
+            | Request::Delete(_)
+            | Request::SetReplay(_)
+            | Request::SetStart { .. }
             | Request::SetWaves(_)
             | Request::Remember { .. }
             | Request::Forget(_)

@@ -14,14 +14,15 @@ use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS, own_network};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::drawings::Album;
 use firmware::services::line_us::{Server, serve};
-use firmware::services::network;
 use firmware::services::storage::Memory;
+use firmware::services::{drawer, network};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
 use protocol_core::motion::Micros;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -56,6 +57,9 @@ struct Serve {
     /// Where the arm keeps its name, calibration and network, made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.state")]
     state: PathBuf,
+    /// Where the arm keeps drawings, made if it does not exist; beside the state if nothing is said
+    #[arg(long, value_name = "FILE")]
+    drawings: Option<PathBuf>,
     /// How fast the arm's time runs: a factor, or 'max' for as fast as possible
     #[arg(long, value_name = "FACTOR", default_value = "1")]
     speed: Speed,
@@ -124,8 +128,13 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let listener = embassy_futures::block_on(Listener::bind(options.line_us))
         .map_err(|error| named(&options.line_us, error))?;
     let listener: &'static Listener = Box::leak(Box::new(listener));
-    let flash =
-        FileFlash::open(&options.state).map_err(|error| named(&options.state.display(), error))?;
+    let open = |path: &Path, size| {
+        FileFlash::open(path, size).map_err(|error| named(&path.display(), error))
+    };
+    let flash = open(&options.state, flash::SIZE)?;
+    let drawings = options.drawings.clone();
+    let drawings = drawings.unwrap_or_else(|| options.state.with_extension("drawings"));
+    let drawings = open(&drawings, flash::DRAWINGS_SIZE)?;
     let data = ArmData {
         lift_after: Micros::from_secs(options.lift_after),
         ..ArmData::default()
@@ -136,6 +145,7 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     };
     let (recorder, servos) = Recorder::start(outputs, data, options.speed == Speed::Max)?;
     let (house, memory) = house(data, flash)?;
+    let album = album(drawings)?;
     let frame = options.common.frame();
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed)).map_err(io::Error::other)?;
 
@@ -146,7 +156,7 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let mut spawned = Ok(());
     clock::run(
         options.speed,
-        |spawner| spawned = serve_clients(spawner, house, memory, servos, frame, listener),
+        |spawner| spawned = serve_clients(spawner, house, (memory, album), servos, frame, listener),
         || STOP.load(Ordering::Relaxed),
     );
     spawned.map_err(io::Error::other)?;
@@ -157,7 +167,7 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
 fn serve_clients(
     spawner: Spawner,
     house: &'static House,
-    memory: Memory<Flash>,
+    (memory, album): (Memory<Flash>, Album<Flash>),
     servos: RecordedServos,
     frame: Duration,
     listener: &'static Listener,
@@ -165,6 +175,8 @@ fn serve_clients(
     static SERVER: Server = Server::new();
     spawner.spawn(arm(house, servos, frame)?);
     spawner.spawn(storage(house, memory)?);
+    spawner.spawn(drawings(house, album)?);
+    spawner.spawn(draw_stored(house)?);
     spawner.spawn(wifi(house)?);
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(listener, client, house)?);
@@ -210,6 +222,24 @@ async fn storage(house: &'static House, memory: Memory<Flash>) {
     house.store.run(memory).await;
 }
 
+#[embassy_executor::task]
+async fn drawings(house: &'static House, album: Album<Flash>) {
+    house.drawings.run(album).await;
+}
+
+#[embassy_executor::task]
+async fn draw_stored(house: &'static House) {
+    drawer::run(house).await;
+}
+
+/// The drawings in a flash.
+fn album(flash: FileFlash) -> io::Result<Album<Flash>> {
+    let album = Album::new(BlockingAsync::new(flash), 0..flash::DRAWINGS_SIZE);
+    let mut album = album.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
+    embassy_futures::block_on(album.open());
+    Ok(album)
+}
+
 /// An arm with what its flash remembers.
 fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<Flash>)> {
     let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
@@ -239,7 +269,8 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
         picture: options.picture.clone(),
     };
     let (recorder, servos) = Recorder::start(outputs, data, false)?;
-    let (house, memory) = house(data, FileFlash::in_memory())?;
+    let (house, memory) = house(data, FileFlash::in_memory(flash::SIZE))?;
+    let album = album(FileFlash::in_memory(flash::DRAWINGS_SIZE))?;
     let frame = options.common.frame();
 
     // Nobody watches: time may always jump.
@@ -248,6 +279,7 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     let spawn = |spawner: Spawner| {
         spawner.spawn(arm(house, servos, frame)?);
         spawner.spawn(storage(house, memory)?);
+        spawner.spawn(drawings(house, album)?);
         spawner.spawn(client(script, house)?);
         Ok::<_, SpawnError>(())
     };

@@ -17,9 +17,10 @@ use firmware::boards::esp::start::{self, Network, Parts};
 use firmware::boards::esp::system::Watchdog;
 use firmware::boards::esp::{Button, last_panic, pwm_timer, system};
 use firmware::services::House;
+use firmware::services::drawings::Album;
 use firmware::services::line_us::{ANYWHERE, Server};
 use firmware::services::storage::Memory;
-use firmware::services::{network, panel};
+use firmware::services::{drawer, network, panel};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 use protocol_core::panel::Lamp;
 use protocol_core::settings::Settings;
@@ -50,9 +51,16 @@ async fn main(spawner: Spawner) {
         Some(memory) => memory.load().await.0,
         None => Settings::default(),
     };
+    let mut album = parts.drawings.take().and_then(|partition| {
+        let whole = 0..partition.size();
+        Album::new(partition, whole)
+    });
+    if let Some(album) = &mut album {
+        album.open().await;
+    }
     static HOUSE: StaticCell<House> = StaticCell::new();
     let house = House::new(BOARD.arm(), settings, system::identity(), vitals);
-    if spawn(spawner, HOUSE.init(house), memory, parts).is_err() {
+    if spawn(spawner, HOUSE.init(house), (memory, album), parts).is_err() {
         defmt::error!("a service does not run: more tasks of a kind than its pool holds");
     }
 }
@@ -60,12 +68,17 @@ async fn main(spawner: Spawner) {
 fn spawn(
     spawner: Spawner,
     house: &'static House,
-    memory: Option<Memory<FlashPartition>>,
+    (memory, album): (
+        Option<Memory<FlashPartition>>,
+        Option<Album<FlashPartition>>,
+    ),
     parts: Parts,
 ) -> Result<(), SpawnError> {
     parts.urgent.spawn(arm(house, parts.servos)?);
     spawner.spawn(watch(parts.watchdog)?);
     spawner.spawn(storage(house, memory)?);
+    spawner.spawn(drawings(house, album)?);
+    spawner.spawn(draw_stored(house)?);
     spawner.spawn(light(house, parts.light)?);
     spawner.spawn(button(house, parts.button)?);
     // `parts.serial` is open; the dialect of the serial port attaches here.
@@ -118,6 +131,22 @@ async fn storage(house: &'static House, memory: Option<Memory<FlashPartition>>) 
             house.store.refuse().await;
         }
     }
+}
+
+#[embassy_executor::task]
+async fn drawings(house: &'static House, album: Option<Album<FlashPartition>>) {
+    match album {
+        Some(album) => house.drawings.run(album).await,
+        None => {
+            defmt::error!("no partition for drawings: none is kept");
+            house.drawings.refuse().await;
+        }
+    }
+}
+
+#[embassy_executor::task]
+async fn draw_stored(house: &'static House) {
+    drawer::run(house).await;
 }
 
 #[embassy_executor::task]

@@ -2,12 +2,15 @@
 #![no_std]
 #![no_main]
 
+use core::ops::Range;
 use edge_nal::TcpBind;
+use embassy_embedded_hal::flash::partition::Partition;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_futures::select::{Either, select};
 use embassy_net::{Config, Runner, Stack, StackResources};
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::Mutex;
 use embassy_time::{Duration, Timer};
-use firmware::boards::SETTINGS;
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::boards::virt::flash::Flash;
@@ -17,11 +20,13 @@ use firmware::boards::virt::world::light::Light;
 use firmware::boards::virt::world::servos::Servos;
 use firmware::boards::virt::world::{Lines, Recorder};
 use firmware::boards::virt::{self, Wired, executor};
+use firmware::boards::{DRAWINGS, SETTINGS};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::drawings::Album;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::storage::Memory;
-use firmware::services::{network, panel};
+use firmware::services::{drawer, network, panel};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -32,6 +37,9 @@ const FRAME: Duration = Duration::from_millis(10);
 const CONNECTIONS: usize = MAX_CLIENTS + 1;
 const BUFFER: usize = 2048;
 
+/// The disk, which settings and drawings share.
+type Disk = Mutex<NoopRawMutex, Flash>;
+type Part = Partition<'static, NoopRawMutex, Flash>;
 type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
 
 /// Never returns.
@@ -57,8 +65,13 @@ fn main() -> ! {
 /// Reads the settings, then starts everything else.
 #[embassy_executor::task]
 async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtNet, disk: Flash) {
-    let Some(mut memory) = Memory::new(disk, SETTINGS) else {
-        log::error!("the settings do not lie in whole pages");
+    static DISK: StaticCell<Disk> = StaticCell::new();
+    let disk = DISK.init(Mutex::new(disk));
+    let part = |range: Range<u32>| Partition::new(disk, range.start, range.end - range.start);
+    let memory = Memory::new(part(SETTINGS), 0..SETTINGS.end - SETTINGS.start);
+    let album = Album::new(part(DRAWINGS), 0..DRAWINGS.end - DRAWINGS.start);
+    let (Some(mut memory), Some(mut album)) = (memory, album) else {
+        log::error!("settings and drawings do not lie in whole pages");
         return;
     };
     // QEMU that takes no sleep (`-icount sleep=off`) now and then forgets a disk that answers while no
@@ -68,8 +81,12 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
             Timer::after_millis(1).await;
         }
     };
-    let settings = match select(memory.load(), alarm).await {
-        Either::First((settings, _)) => settings,
+    let load = async {
+        album.open().await;
+        memory.load().await.0
+    };
+    let settings = match select(load, alarm).await {
+        Either::First(settings) => settings,
         Either::Second(never) => never,
     };
     let identity = Identity {
@@ -82,7 +99,7 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         identity,
         virt::VITALS,
     ));
-    if start(spawner, tick, house, memory, card).is_err() {
+    if start(spawner, tick, house, (memory, album), card).is_err() {
         log::error!("a task does not fit");
     }
 }
@@ -91,7 +108,7 @@ fn start(
     spawner: Spawner,
     tick: embassy_executor::SendSpawner,
     house: &'static House,
-    memory: Memory<Flash>,
+    (memory, album): (Memory<Part>, Album<Part>),
     card: VirtNet,
 ) -> Result<(), SpawnError> {
     static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
@@ -101,6 +118,8 @@ fn start(
 
     tick.spawn(servo_tick(house)?);
     spawner.spawn(storage(house, memory)?);
+    spawner.spawn(drawings(house, album)?);
+    spawner.spawn(draw_stored(house)?);
     spawner.spawn(light(house)?);
     spawner.spawn(button(house)?);
     spawner.spawn(wifi(house)?);
@@ -142,8 +161,18 @@ async fn servo_tick(house: &'static House) {
 }
 
 #[embassy_executor::task]
-async fn storage(house: &'static House, memory: Memory<Flash>) {
+async fn storage(house: &'static House, memory: Memory<Part>) {
     house.store.run(memory).await;
+}
+
+#[embassy_executor::task]
+async fn drawings(house: &'static House, album: Album<Part>) {
+    house.drawings.run(album).await;
+}
+
+#[embassy_executor::task]
+async fn draw_stored(house: &'static House) {
+    drawer::run(house).await;
 }
 
 #[embassy_executor::task]

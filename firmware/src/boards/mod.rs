@@ -23,19 +23,27 @@ mod esp32s3;
 
 /// Where the settings are in a flash of 4 MB; `partitions.csv` is the whole layout.
 pub const SETTINGS: core::ops::Range<u32> = 0x29_0000..0x29_8000;
+/// Where the drawings are in it.
+pub const DRAWINGS: core::ops::Range<u32> = 0x29_8000..0x40_0000;
 
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_settings_are_where_the_partition_table_says() {
+    fn settings_and_drawings_are_where_the_partition_table_says() {
         let table = include_str!("../../partitions.csv");
-        let row = table
-            .lines()
-            .find(|line| line.starts_with("settings,"))
-            .unwrap();
-        let fields: Vec<&str> = row.split(',').map(str::trim).collect();
-        let number = |text: &str| u32::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
-        let (start, size) = (number(fields[3]), number(fields[4]));
-        assert_eq!(super::SETTINGS, start..start + size);
+        for (name, range) in [
+            ("settings,", super::SETTINGS),
+            ("drawings,", super::DRAWINGS),
+        ] {
+            let row = table.lines().find(|line| line.starts_with(name)).unwrap();
+            let fields: Vec<&str> = row.split(',').map(str::trim).collect();
+            let number =
+                |text: &str| u32::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
+            let (start, size) = (number(fields[3]), number(fields[4]));
+            assert_eq!(range, start..start + size);
+        }
+        // All of it is used.
+        let pages = super::DRAWINGS.len() / 4096;
+        assert_eq!(pages, crate::services::drawings::MAX_SHEETS);
     }
 }

@@ -200,22 +200,20 @@ async fn draw_stored(slot: Slot, house: &House) -> ReplayChanged {
             reader.check().await?;
             draw(&mut reader, Pen::AsWritten, Client::DRAWER, house).await
         });
-        let complete = loop {
+        loop {
             match select(&mut drawing, orders.receive()).await {
-                Either::First(Ok(())) => break true,
+                Either::First(Ok(())) | Either::Second(Order::Stop) => break,
                 Either::First(Err(error)) => {
                     warning!("drawing {}: {}", slot.number(), error.text());
-                    break false;
+                    break;
                 }
-                Either::Second(Order::Stop) => break false,
                 Either::Second(Order::Replay) => replay = ReplayChanged(true),
                 // One at a time is ordered.
                 Either::Second(Order::Draw(_)) => {}
             }
-        };
-        if !complete {
-            lift(Client::DRAWER, house).await;
         }
+        // Nobody is there who could still mean to go on.
+        lift(Client::DRAWER, house).await;
         house
             .arm
             .with(|machine| machine.client_gone(Client::DRAWER));

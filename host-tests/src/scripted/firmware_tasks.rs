@@ -2,7 +2,7 @@
 
 use super::arm::Servos;
 use super::button::Button;
-use super::flash::{Cells, Flash, SIZE};
+use super::flash::{Cells, Flash, SETTINGS, SIZE};
 use super::light::Light;
 use super::power::Power;
 use super::radio::{RecordedAddress, RecordedRadio};
@@ -11,9 +11,10 @@ use super::{Board, FRAME};
 use firmware::board::Vitals;
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::drawings::Album;
 use firmware::services::line_us::Server;
 use firmware::services::storage::Memory;
-use firmware::services::{network, panel};
+use firmware::services::{drawer, network, panel};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client};
 use protocol_core::settings::Settings;
@@ -26,7 +27,11 @@ const IDENTITY: Identity = Identity {
 };
 
 fn memory(flash: Flash) -> Memory<Flash> {
-    Memory::new(flash, 0..SIZE).expect("whole pages, at least two of them")
+    Memory::new(flash, 0..SETTINGS).expect("whole pages, at least two of them")
+}
+
+fn album(flash: Flash) -> Album<Flash> {
+    Album::new(flash, SETTINGS..SIZE).expect("whole pages")
 }
 
 /// Starts everything, as the programs of the other boards do.
@@ -39,17 +44,19 @@ pub fn start(board: &Board, reason: &'static str) {
             house.is_some_and(|house| house.arm.with(|arm| arm.next_event().is_some()))
         }
     };
-    let flash = Flash {
+    let moving: Rc<dyn Fn() -> bool> = Rc::new(moving);
+    let flash = || Flash {
         cells: board.cells.clone(),
         power: board.power.clone(),
-        moving: Rc::new(moving),
+        moving: moving.clone(),
     };
+    let (mut memory, mut album) = (memory(flash()), album(flash()));
     let devices = Devices::of(board);
     let spawner = board.tasks.spawner();
     let place = board.house.clone();
     board.tasks.spawner().spawn(async move {
-        let mut memory = memory(flash);
         let (settings, _) = memory.load().await;
+        album.open().await;
         let vitals = Vitals {
             free_memory: || 100_000,
             reset_reason: reason,
@@ -66,6 +73,10 @@ pub fn start(board: &Board, reason: &'static str) {
         });
         let served = house.clone();
         spawner.spawn(async move { served.store.run(memory).await });
+        let served = house.clone();
+        spawner.spawn(async move { served.drawings.run(album).await });
+        let served = house.clone();
+        spawner.spawn(async move { drawer::run(&served).await });
         let served = house.clone();
         spawner.spawn(async move { served.panel.shine(devices.light).await });
         let served = house.clone();

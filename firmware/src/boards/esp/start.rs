@@ -43,6 +43,8 @@ pub struct Parts {
     pub serial: Option<(SerialRx, SerialTx)>,
     /// Flash for the settings; `None` if the partition table has no such place.
     pub settings: Option<FlashPartition>,
+    /// Flash for drawings; `None` if the partition table has no such place.
+    pub drawings: Option<FlashPartition>,
     /// Radio and network stack; `None` if they could not be started.
     pub network: Option<Network>,
     /// Watchdog, not yet started.
@@ -81,7 +83,7 @@ pub fn parts() -> Parts {
         power,
     };
 
-    let [settings] = flash::open(chip.FLASH, ["settings"]);
+    let [settings, drawings] = flash::open(chip.FLASH, ["settings", "drawings"]);
     let pull_up = InputConfig::default().with_pull(Pull::Up);
     let serial = serial::open(chip.UART0, &BOARD.serial);
     if let Err(error) = &serial {
@@ -103,6 +105,7 @@ pub fn parts() -> Parts {
         button: Input::new(pin(BOARD.button_pin), pull_up),
         serial: serial.ok(),
         settings,
+        drawings,
         network,
         watchdog: Watchdog::new(timers.wdt),
     }

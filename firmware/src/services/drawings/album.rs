@@ -25,6 +25,8 @@ use protocol_core::drawings::{Contents, MAX_DRAWINGS, Slot, Space};
 
 /// Most sheets that are used: as many as the partition has pages (`partitions.csv`).
 pub const MAX_SHEETS: usize = 360;
+/// Pages that do not take anything, one after the other, until the whole flash is thought not to.
+const BAD_AT_MOST: u8 = 8;
 /// Longest word of a flash that drawings can be kept in.
 const WORD: usize = 4;
 /// Bytes that are written or read at once, at most.
@@ -242,6 +244,11 @@ impl<F: NorFlash> Album<F> {
         contents(&self.stored)
     }
 
+    /// The number that the drawing in this slot has alone, for [`Self::read`].
+    pub fn sequence_of(&self, slot: Slot) -> Option<u32> {
+        self.stored(slot).map(|stored| stored.sequence)
+    }
+
     pub(super) const fn catalogue(&self) -> &Catalogue {
         &self.stored
     }
@@ -326,6 +333,7 @@ impl<F: NorFlash> Album<F> {
 
     /// Takes the next free sheet for what is being recorded. One that does not take its head is passed over.
     async fn begin_sheet(&mut self) -> Result<(), AlbumError> {
+        let mut bad = 0;
         for _ in 0..self.count {
             let sheet = self.next;
             self.next = (sheet + 1) % self.count;
@@ -344,6 +352,10 @@ impl<F: NorFlash> Album<F> {
             if !taken {
                 warning!("a page of the drawings' memory is worn out");
                 self.set(sheet, Owner::Worn, 0);
+                bad += 1;
+                if bad == BAD_AT_MOST {
+                    return Err(AlbumError::Worn);
+                }
                 continue;
             }
             self.set(sheet, Owner::Draft, head.index);
