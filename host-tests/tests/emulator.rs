@@ -335,6 +335,53 @@ fn the_button_and_m587_change_the_network_and_the_light_shows_it() {
     );
 }
 
+#[test]
+fn a_drawing_from_memory_moves_the_servos_exactly_as_on_the_desktop() {
+    let file = Path::new(EXAMPLES).join("hello.gcode");
+    let text = fs::read_to_string(&file).unwrap();
+    let machine = Machine::boot(Time::Virtual);
+    let mut client = machine.client();
+    // What follows is to be the drawing alone.
+    assert_eq!(client.say("M291 S2"), "ok ");
+    assert_eq!(client.say("M28 S7"), "ok ");
+    for line in text.lines() {
+        assert_eq!(client.say(line), "ok ", "{line}");
+    }
+    assert_eq!(client.say("M29"), "ok ");
+    let length = "G54 X0 Y0 S1\n".len() + text.len();
+    let list = format!("ok FS:\"/0000007.txt-{length};\"");
+    assert_eq!(client.say("M20"), list);
+
+    let mut machine = machine.power_cycle();
+    let mut client = machine.client();
+    assert_eq!(client.say("M20"), list);
+    assert_eq!(client.say("M23 K7"), "ok ");
+    // It needs nobody.
+    drop(client);
+    machine
+        .emulator
+        .wait_for_line("drawing 7 has ended", PATIENCE)
+        .unwrap();
+    let expected = desktop_motion(&file);
+    let (mut seen, mut late) = (Vec::new(), 0);
+    for _ in 0..100 {
+        for frame in machine.frames() {
+            seen.push(frame.set_point.pulses.map(|pulse| pulse.get()));
+            late = late.max(frame.late);
+        }
+        if motion(seen.iter().copied()).len() >= expected.len() {
+            break;
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+    let moved = motion(seen);
+    let differs = moved.iter().zip(&expected).position(|(a, b)| a != b);
+    assert_eq!(differs, None, "the first pulses that differ");
+    assert_eq!(moved.len(), expected.len());
+    // Reading flash delays no frame.
+    assert!(late <= 2, "{late} us late");
+}
+
 impl Machine {
     fn wait_for_light(&mut self, wanted: [u8; 3]) {
         for _ in 0..400 {
