@@ -227,11 +227,18 @@ fn live(history: u64, length: usize) -> Figures {
     let mut dice = Dice::new(history);
     let chip = Small::erased();
     let mut now = Drawings::new();
+    let mut album = boot(&chip).expect("it starts");
     for _ in 0..dice.below(30) {
         let (deed, after) = Deed::any(&now, &mut dice);
-        let mut album = boot(&chip).expect("it starts");
         assert_eq!(deed.perform(&mut album), Ok(()), "{deed:?}");
         assert_eq!(read_all(&mut album).as_ref(), Ok(&after));
+        // A start would find the same, and leaves nothing to repair.
+        let copy = Small::with(chip.state().cells);
+        assert_eq!(found(&copy), after);
+        assert_eq!(copy.work(), 0, "{deed:?}");
+        if dice.below(3) == 0 {
+            album = boot(&chip).expect("it starts");
+        }
         now = after;
     }
     for number in 0..length {
@@ -346,6 +353,17 @@ fn worn_pages_are_passed_over_and_promise_nothing() {
 /// As [`found`], where a page that does not take anything is still free after a start.
 fn found_with_wear(chip: &Small) -> Drawings {
     read_all(&mut boot(chip).expect("it starts")).expect("it can be read")
+}
+
+#[test]
+fn what_was_replaced_does_not_come_back_when_the_new_one_is_deleted() {
+    let chip = Small::erased();
+    let mut album = boot(&chip).expect("it starts");
+    for text in [vec![1; 300], vec![2; 300], vec![3; 300]] {
+        assert_eq!(Deed::Record(5, text).perform(&mut album), Ok(()));
+    }
+    assert_eq!(Deed::Delete(5).perform(&mut album), Ok(()));
+    assert_eq!(found(&chip), Drawings::new());
 }
 
 #[test]
