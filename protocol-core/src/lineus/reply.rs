@@ -14,8 +14,8 @@ use heapless::Vec;
 /// Ends every message to a client, the greeting included.
 pub const TERMINATOR: &str = "\r\n\0";
 /// Longest message, terminator included. Everyday replies stay below 256 bytes, because some clients
-/// read one packet for each reply into a buffer of that size; diagnostics and lists of networks may be
-/// longer. Every network that is remembered fits into such a list, whatever its name.
+/// read one packet for each reply into a buffer of that size; diagnostics, lists of networks and lists
+/// of drawings may be longer. Every network that is remembered fits into such a list, whatever its name.
 pub const MAX_REPLY: usize = 768;
 const _: () = assert!(
     "ok ".len() + MAX_NETWORKS * (" \"\":1".len() + 2 * MAX_SSID) + TERMINATOR.len() <= MAX_REPLY
