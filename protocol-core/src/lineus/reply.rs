@@ -283,7 +283,7 @@ impl Reply {
             "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
              WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
-             Memory:\"{}\" FSUsed:{} FSTotal:{} FSFree:{}{}",
+             FSUsed:{} FSTotal:{} FSFree:{} Memory:\"{}\"{}",
             state.name.as_str(),
             state.identity.serial(),
             Uptime(state.uptime),
@@ -295,10 +295,10 @@ impl Reply {
             InWords(state.wifi),
             state.free_memory,
             state.reset_reason,
-            state.memory,
             state.space.used,
             state.space.total,
             state.space.free(),
+            state.memory,
             LastPanic(state.last_panic),
         ));
     }
@@ -679,9 +679,9 @@ mod tests {
             });
         });
         assert!(
-            text.contains(
-                " FSTotal:4294967295 FSFree:3060399405 LastPanic:\"panicked at 'somewhere'?"
-            ) && text.ends_with("...\""),
+            text.contains(" FSTotal:4294967295 FSFree:3060399405 Memory:\"worn out,")
+                && text.contains("stored\" LastPanic:\"panicked at 'somewhere'?")
+                && text.ends_with("...\""),
             "{text}"
         );
         // Outside quotes, blanks separate tokens.
