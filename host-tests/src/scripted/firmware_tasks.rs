@@ -74,10 +74,6 @@ pub fn start(board: &Board, reason: &'static str) {
         let served = house.clone();
         spawner.spawn(async move { served.store.run(memory).await });
         let served = house.clone();
-        spawner.spawn(async move { served.drawings.run(album).await });
-        let served = house.clone();
-        spawner.spawn(async move { drawer::run(&served).await });
-        let served = house.clone();
         spawner.spawn(async move { served.panel.shine(devices.light).await });
         let served = house.clone();
         spawner.spawn(async move { panel::watch(&served, devices.button).await });
@@ -90,6 +86,9 @@ pub fn start(board: &Board, reason: &'static str) {
             spawner.spawn(async move { server.work(&*acceptor, client, &served).await });
         }
         spawner.spawn(async move { server.turn_away(&*acceptor).await });
+        let served = house.clone();
+        spawner.spawn(async move { served.drawings.run(album).await });
+        spawner.spawn(async move { drawer::run(&house).await });
     });
 }
 
