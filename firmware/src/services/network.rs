@@ -293,6 +293,11 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                             self.house.wifi.listed.signal(());
                             continue;
                         }
+                        // The own network goes on until the reply to M587 has reached its client.
+                        Either::Second(input @ Input::Try(_)) => {
+                            select(&mut serving, Timer::after(GRACE)).await;
+                            input
+                        }
                         Either::Second(input) => input,
                     };
                     return Some(input);
@@ -304,10 +309,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
     async fn take(&mut self, input: Input) {
         match input {
             Input::Press(gesture) => self.on(Event::Press(gesture)),
-            Input::Try(network) => {
-                Timer::after(GRACE).await;
-                self.on(Event::Try(network));
-            }
+            Input::Try(network) => self.on(Event::Try(network)),
             Input::Changed => self.on(Event::Changed),
             Input::Restart => self.on(Event::Restart),
             Input::List => {
