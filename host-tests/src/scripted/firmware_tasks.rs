@@ -31,14 +31,9 @@ fn memory(flash: Flash) -> Memory<Flash> {
 
 /// Starts everything, as the programs of the other boards do.
 pub fn start(board: &Board, reason: &'static str) {
-    let moving = {
-        let house = board.house.clone();
-        move || {
-            let house = house.borrow();
-            let house: Option<&Rc<House>> = house.as_ref();
-            house.is_some_and(|house| house.arm.with(|arm| arm.next_event().is_some()))
-        }
-    };
+    let place = board.house.clone();
+    let moves = |house: &Rc<House>| house.arm.with(|arm| arm.next_event().is_some());
+    let moving = move || place.borrow().as_ref().is_some_and(moves);
     let flash = Flash {
         cells: board.cells.clone(),
         power: board.power.clone(),

@@ -37,7 +37,6 @@ const POLLS_AT_MOST: usize = 200_000;
 
 /// The devices, and the firmware while there is power.
 pub struct Board {
-    time: HandTime,
     /// Supply, and what has gone wrong with the firmware.
     pub power: Power,
     /// What is in the air.
@@ -56,13 +55,14 @@ pub struct Board {
     pub port: Rc<Port>,
     house: Rc<RefCell<Option<Rc<House>>>>,
     tasks: Tasks,
+    /// The last to go.
+    time: HandTime,
 }
 
 impl Board {
     /// A new machine in its box: nothing stored, no power. Time begins at 0, and belongs to this thread.
     pub fn new() -> Self {
         Self {
-            time: HandTime::take(),
             power: Power::default(),
             air: Rc::new(Air::new(Pace::LIFELIKE)),
             radio: Rc::default(),
@@ -73,6 +73,7 @@ impl Board {
             port: Rc::default(),
             house: Rc::default(),
             tasks: Tasks::default(),
+            time: HandTime::take(),
         }
     }
 
@@ -89,6 +90,7 @@ impl Board {
             self.power.switch(false);
         }
         self.tasks = Tasks::default();
+        self.time.forget_alarms();
         self.house.take();
         self.port.power_off();
         self.arm.power_off();
@@ -108,7 +110,7 @@ impl Board {
                 return false;
             }
         }
-        if !self.power.is_on() && self.house.borrow().is_some() {
+        if !self.power.is_on() && !self.tasks.is_empty() {
             // It failed by itself.
             self.cut_the_power();
         }
@@ -151,5 +153,42 @@ impl Board {
 impl Default for Board {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_futures::yield_now;
+
+    #[test]
+    fn a_firmware_that_runs_in_circles_is_told() {
+        let mut board = Board::new();
+        board.power_on("a test");
+        board.settle();
+        assert_eq!(board.power.offence(), None);
+        board.tasks.spawner().spawn(async {
+            loop {
+                yield_now().await;
+            }
+        });
+        board.settle();
+        let offence = board.power.offence().unwrap();
+        assert!(offence.contains("runs in circles"), "{offence}");
+    }
+
+    #[test]
+    fn power_cycles_leave_nothing_behind() {
+        let mut board = Board::new();
+        for _ in 0..100 {
+            board.power_on("a test");
+            board.settle();
+        }
+        assert_eq!(board.power.offence(), None);
+        board.cut_the_power();
+        assert_eq!(board.time.next_alarm(), None);
+        assert!(board.house.borrow().is_none());
+        assert_eq!((board.air.own(), board.air.joined()), (None, None));
+        assert_eq!(Rc::strong_count(&board.port), 1);
     }
 }
