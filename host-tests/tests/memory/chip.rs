@@ -134,7 +134,8 @@ impl<const PAGE: usize> Chip<PAGE> {
 
     fn check(at: u32, length: usize, unit: usize) -> Result<usize, ChipError> {
         let at = at as usize;
-        let fits = at + length <= Self::SIZE && at % unit == 0 && length.is_multiple_of(unit);
+        let fits =
+            at + length <= Self::SIZE && at.is_multiple_of(unit) && length.is_multiple_of(unit);
         fits.then_some(at).ok_or(ChipError::OutOfRange)
     }
 }
