@@ -261,7 +261,7 @@ fn the_arm_is_where_it_is() {
         "A sends G01 Z0\nA hears ok ...\npen stays up for 1 s",
         "it is at 1000.00 1000.00 49",
     );
-    fails("nib passes 1100 1000", "it does not move");
+    fails("wait 1 s\nnib passes 1100 1000", "it does not move");
     let corner = "A sends G01 X1100 Z0\nA sends G01 Y900\nA hears ok ...\nA hears ok ...\n";
     fails(
         &format!("{corner}nib passes 1101 1000"),

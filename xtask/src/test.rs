@@ -6,6 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 use xtask::board::{Board, own_cargo, root, run};
 use xtask::emulator::QEMU;
+use xtask::ready::Owner;
 use xtask::toolchain::require;
 
 /// Runs all checks, the quick ones first, up to the first that fails.
@@ -61,7 +62,10 @@ pub fn everything(setup: bool) -> Result<()> {
     })?;
     for board in Board::CHIPS {
         step(&format!("image for {}", board.name()), || {
-            println!("{}", crate::image::image(board, setup)?.display());
+            println!(
+                "{}",
+                crate::image::image(board, &Owner::default(), setup)?.display()
+            );
             Ok(())
         })?;
     }

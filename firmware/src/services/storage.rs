@@ -3,6 +3,7 @@
 //! Written only while the arm rests: who asks for a store holds the arm at rest meanwhile.
 
 mod memory;
+mod pages;
 mod parts;
 mod view;
 

@@ -5,6 +5,7 @@ pub mod canvas;
 pub mod clock;
 pub mod draw;
 pub mod flash;
+pub mod imprint;
 pub mod net;
 pub mod recorder;
 
