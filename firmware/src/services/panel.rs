@@ -18,7 +18,7 @@ use protocol_core::settings::StartMode;
 /// How long the light tells that everything could not be forgotten.
 const COMPLAINT: Duration = Duration::from_secs(5);
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 struct Shown {
     /// What the machine does.
     lamp: Lamp,
@@ -61,8 +61,14 @@ impl Panel {
     }
 
     fn change(&self, f: impl FnOnce(Shown) -> Shown) {
-        self.shown.lock(|shown| shown.set(f(shown.get())));
-        self.changed.signal(());
+        let differs = self.shown.lock(|shown| {
+            let after = f(shown.get());
+            shown.replace(after) != after
+        });
+        // The same again does not disturb the rhythm.
+        if differs {
+            self.changed.signal(());
+        }
     }
 
     /// The light, for ever. White lasts as long as a press means a factory reset.

@@ -112,10 +112,26 @@ impl Devices {
 
 /// What a start would find in these cells, which stay as they are.
 pub fn remembered(cells: &Cells) -> Settings {
-    let flash = Flash {
-        cells: Rc::new(RefCell::new(cells.clone())),
+    let copy = Rc::new(RefCell::new(cells.clone()));
+    embassy_futures::block_on(at_rest(&copy).load()).0
+}
+
+/// Changes what these cells hold.
+pub fn remember(cells: &Rc<RefCell<Cells>>, change: impl FnOnce(&mut Settings)) {
+    let mut memory = at_rest(cells);
+    embassy_futures::block_on(async {
+        let (mut settings, _) = memory.load().await;
+        change(&mut settings);
+        let stored = memory.store(&settings).await;
+        stored.expect("the memory is well where a scenario begins");
+    });
+}
+
+/// The memory in these cells, without the machine.
+fn at_rest(cells: &Rc<RefCell<Cells>>) -> Memory<Flash> {
+    memory(Flash {
+        cells: cells.clone(),
         power: Power::present(),
         moving: Rc::new(|| false),
-    };
-    embassy_futures::block_on(memory(flash).load()).0
+    })
 }

@@ -144,6 +144,11 @@ impl Board {
             .is_some_and(|house| house.arm.with(|arm| arm.is_busy()))
     }
 
+    /// Has the machine remember something, as if it had been told before.
+    pub fn remember(&mut self, change: impl FnOnce(&mut Settings)) {
+        firmware_tasks::remember(&self.cells, change);
+    }
+
     /// What a restart would find in memory.
     pub fn remembered(&self) -> Settings {
         firmware_tasks::remembered(&self.cells.borrow())
