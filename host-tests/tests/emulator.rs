@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
-use xtask::emulator::{Emulator, Options, Time, free_address};
+use xtask::emulator::{Emulator, FLASH_SIZE, Options, Time, free_address};
+use xtask::ready::{Owner, put_into};
 use xtask::records::{Frame, Record};
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -293,6 +294,35 @@ fn settings_survive_a_power_cycle() {
     let mut client = machine.client();
     assert_eq!(client.say("M550"), "ok MACHINENAME:robs-lineus");
     assert_eq!(calibration_of(&mut client), calibration);
+}
+
+#[test]
+fn a_ready_made_arm_joins_its_network_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let password = folder.path().join("password");
+    fs::write(&password, "correct horse\n").unwrap();
+    let owner = Owner {
+        network: Some("quill-test".into()),
+        password_file: Some(password),
+        name: Some("robs-lineus".into()),
+    };
+    let settings = owner.settings().unwrap().unwrap();
+    let table = include_str!("../../firmware/partitions.csv");
+    let mut flash = vec![0xff; FLASH_SIZE as usize];
+    put_into(&mut flash, &settings, table).unwrap();
+    fs::write(folder.path().join("flash"), flash).unwrap();
+
+    let mut machine = Machine::boot_in(folder, Time::Wall);
+    machine.wait_for_light([0, 0, 64]);
+    let said = machine.emulator.said();
+    assert!(
+        said.iter().any(|line| line.contains("network joined")),
+        "{said:?}"
+    );
+    let mut client = machine.client();
+    assert_eq!(client.say("M550"), "ok MACHINENAME:robs-lineus");
+    let diagnostics = client.say("M122");
+    assert!(diagnostics.contains(" Memory:\"ok\""), "{diagnostics}");
 }
 
 fn calibration_of(client: &mut Client) -> String {
