@@ -1,5 +1,14 @@
 //! Lines with a checksum: any number of redundant ones, `^`, then a final one, `*`; the first right one
 //! counts (`spec lasaurgrbl, Checksum and Error Correction`).
+//!
+//! Prefix and newline have no checksum, and they too can be damaged. A prefixed line is known by its
+//! checksum byte, for nothing else is 128 or more; so what damage has made of one is known as well, and a
+//! line is neither lost in silence nor taken for the one before it:
+//!
+//! - two lines that became one, their newline damaged: the second part is judged as the line it was;
+//! - a line whose prefix is damaged is refused by the parser, and ends the group if a redundant line was
+//!   right, because hosts send one redundant line, so that it was the final one;
+//! - after a wrong redundant line it is the final line that failed.
 
 use super::checksum::is_right;
 
@@ -19,45 +28,90 @@ pub enum Verdict<'a> {
 }
 
 /// Where a session is between redundant and final lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum State {
+    /// Nothing of a group has been received.
+    #[default]
+    Between,
+    /// Only wrong redundant lines.
+    Wrong,
+    /// A redundant line was right: what follows up to the final line is the same.
+    Done,
+}
+
+/// Judges the lines of a session.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Group {
-    /// A redundant line was right: what follows up to the final line is the same.
-    done: bool,
+    state: State,
 }
 
 impl Group {
     /// Between groups.
     pub const fn new() -> Self {
-        Self { done: false }
+        Self {
+            state: State::Between,
+        }
     }
 
     /// A stop ends the group: the sender throws away what it had in mind, and its next line must not be
     /// taken for the end of that.
     pub const fn end(&mut self) {
-        self.done = false;
+        self.state = State::Between;
     }
 
     /// Judges one line.
     pub fn judge<'a>(&mut self, line: &'a [u8]) -> Verdict<'a> {
-        let (last, rest) = match line {
-            [b'^', rest @ ..] => (false, rest),
-            [b'*', rest @ ..] => (true, rest),
-            body => return Verdict::Execute(body),
-        };
-        if self.done {
-            self.done = !last;
+        match line {
+            [b'^', rest @ ..] => self.prefixed(false, rest),
+            [b'*', rest @ ..] => self.prefixed(true, rest),
+            plain if plain.is_ascii() => Verdict::Execute(plain),
+            damaged => self.without_its_prefix(damaged),
+        }
+    }
+
+    fn prefixed<'a>(&mut self, last: bool, rest: &'a [u8]) -> Verdict<'a> {
+        if self.state == State::Done {
+            if last {
+                self.end();
+            }
             return Verdict::Skip;
         }
         match rest {
             [sum @ 128..=255, body @ ..] if is_right(*sum, body) => {
-                self.done = !last;
+                self.state = if last { State::Between } else { State::Done };
                 Verdict::Execute(body)
             }
             [128..=255, ..] if last => Verdict::Failed,
-            [128..=255, ..] => Verdict::Wrong,
+            [128..=255, body @ ..] => match second_line(body) {
+                Some(second) => self.judge(second),
+                None => {
+                    self.state = State::Wrong;
+                    Verdict::Wrong
+                }
+            },
             _ => Verdict::NoChecksum,
         }
     }
+
+    fn without_its_prefix<'a>(&mut self, line: &'a [u8]) -> Verdict<'a> {
+        if self.state == State::Wrong {
+            return Verdict::Failed;
+        }
+        self.end();
+        match second_line(line) {
+            Some(second) => self.judge(second),
+            // Its checksum is no letter.
+            None => Verdict::Execute(line),
+        }
+    }
+}
+
+/// The last line in a body that became part of another line: a prefix and a checksum, neither of which
+/// a body has.
+fn second_line(body: &[u8]) -> Option<&[u8]> {
+    let begins = |pair: &[u8]| matches!(pair, [b'^' | b'*', 128..=255]);
+    let at = body.windows(2).rposition(begins)?;
+    body.get(at..)
 }
 
 #[cfg(test)]
@@ -125,6 +179,53 @@ mod tests {
             judge(&[b"^\x98\xc790", b"*\x98G90"]),
             [Verdict::Wrong, RIGHT]
         );
+    }
+
+    #[test]
+    fn two_lines_that_became_one() {
+        use Verdict::{Execute, Failed, Skip, Wrong};
+        for (lines, verdicts) in [
+            // The redundant line's newline: the final line is right, or wrong.
+            (
+                vec![&b"^\x98G90x*\x98G90"[..], b"*\x9aM80"],
+                vec![RIGHT, Execute(b"M80")],
+            ),
+            (vec![b"^\x98G90x*\x98G95"], vec![Failed]),
+            (vec![b"^\x98G90x^\x98G95", b"*\x98G90"], vec![Wrong, RIGHT]),
+            // The final line's: its group has been executed, and its own second half is skipped.
+            (
+                vec![b"^\x98G90", b"*\x98G90x^\x9aM80", b"*\x9aM80"],
+                vec![RIGHT, Skip, Execute(b"M80")],
+            ),
+            // Its group has not.
+            (vec![b"^\x98G9", b"*\x98G90x^\x9aM80"], vec![Wrong, Failed]),
+        ] {
+            assert_eq!(judge(&lines), verdicts, "{lines:?}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_prefix() {
+        use Verdict::{Execute, Failed, Wrong};
+        for (lines, verdicts) in [
+            (
+                vec![&b"n\x98G90"[..], b"*\x98G90"],
+                vec![Execute(b"n\x98G90"), RIGHT],
+            ),
+            // The next group is not taken for the end of this one.
+            (
+                vec![b"^\x98G90", b"n\x98G90", b"^\x9aM80"],
+                vec![RIGHT, Execute(b"n\x98G90"), Execute(b"M80")],
+            ),
+            (vec![b"^\x98G9", b"n\x98G90"], vec![Wrong, Failed]),
+            (vec![b"n\x98G90x*\x98G90"], vec![RIGHT]),
+            (
+                vec![b"^\x98G90", b"n\x98G90x^\x9aM80"],
+                vec![RIGHT, Execute(b"M80")],
+            ),
+        ] {
+            assert_eq!(judge(&lines), verdicts, "{lines:?}");
+        }
     }
 
     #[test]
