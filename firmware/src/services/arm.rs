@@ -10,13 +10,15 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
-use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report};
+use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report, StopReason};
 use protocol_core::motion::Micros;
 
 /// The arm as its clients see it.
 pub struct Arm {
     machine: Mutex<CriticalSectionRawMutex, RefCell<Machine>>,
     reports: [Signal<CriticalSectionRawMutex, Report>; MAX_ASKERS],
+    /// For the serial port's task alone.
+    plan_changed: Signal<CriticalSectionRawMutex, ()>,
 }
 
 impl Arm {
@@ -25,6 +27,7 @@ impl Arm {
         Self {
             machine: Mutex::new(RefCell::new(machine)),
             reports: array::from_fn(|_| Signal::new()),
+            plan_changed: Signal::new(),
         }
     }
 
@@ -50,6 +53,28 @@ impl Arm {
     pub async fn rest(&self, client: Client) -> Rest<'_> {
         self.errand(client, &Errand::Rest).await;
         Rest { arm: self, client }
+    }
+
+    /// Waits until the plan has room for a segment; a stop makes room.
+    pub async fn room(&self) {
+        self.until(|machine| machine.plan_room() > 0).await;
+    }
+
+    /// Waits until everything planned has been done, or forgotten in a stop.
+    pub async fn plan_done(&self) {
+        self.until(Machine::plan_is_done).await;
+    }
+
+    async fn until(&self, holds: impl Fn(&Machine) -> bool) {
+        while !self.with(|machine| holds(machine)) {
+            self.plan_changed.wait().await;
+        }
+    }
+
+    /// Stops the arm, whoever moves it, and answers those who wait for a move.
+    pub fn stop(&self, reason: StopReason) {
+        self.with(|machine| machine.stop(reason));
+        self.deliver();
     }
 
     /// The servo tick: one set-point in each of the servos' frames, which are `length` apart, for ever.
@@ -87,6 +112,9 @@ impl Arm {
             if let Some(signal) = self.reports.get(client.slot()) {
                 signal.signal(report);
             }
+        }
+        if self.with(Machine::plan_has_changed) {
+            self.plan_changed.signal(());
         }
     }
 }

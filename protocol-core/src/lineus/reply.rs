@@ -117,6 +117,7 @@ impl Reply {
     pub fn report(&mut self, report: &Report) {
         match report {
             Report::Resting => self.ok(),
+            Report::Stopped => self.error(format_args!("{STOPPED}")),
             Report::Moving { end, limited } => self.place(*end, limited.map(tell)),
         }
     }
@@ -229,6 +230,9 @@ impl Reply {
         }
     }
 }
+
+/// Why there is no move.
+const STOPPED: &str = "the machine is stopped: send ~ on the serial line or press the button";
 
 fn tell(limited: Limited) -> &'static str {
     match limited {

@@ -1,7 +1,7 @@
 //! The arm in time: what begins when, what it answers, where it is.
 
 use super::*;
-use crate::motion::contains;
+use crate::motion::{WideCoordinate, contains};
 
 const A: Client = Client(0);
 const B: Client = Client(1);
