@@ -1,7 +1,8 @@
 //! Tests of Quill from outside, and what they need: an independent model of the arm ([`model`]), the
-//! core's session and machine without a firmware around them ([`mod@bench`]), and the desktop arm as a
-//! process with clients over TCP ([`desktop`]).
+//! core's session and machine without a firmware around them ([`mod@bench`], and for a plotter's plan
+//! [`mod@plotter`]), and the desktop arm as a process with clients over TCP ([`desktop`]).
 
 pub mod bench;
 pub mod desktop;
 pub mod model;
+pub mod plotter;
