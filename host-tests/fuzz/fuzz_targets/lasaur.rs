@@ -13,7 +13,9 @@
 use host_tests::lasaur::oracle::is_well_formed;
 use host_tests::lasaur::rig::Rig;
 use libfuzzer_sys::fuzz_target;
-use protocol_core::lasaur::{Effect, StopReason};
+use protocol_core::lasaur::Effect;
+use protocol_core::machine::StopReason;
+use protocol_core::motion::Side;
 
 /// So few that a plan is full before the input ends.
 const PLAN: usize = 2;
@@ -26,7 +28,7 @@ fuzz_target!(|input: &[u8]| {
         let lost = rig.lost;
         match byte {
             1 => rig.work(),
-            2 => rig.happens(Effect::Stop(StopReason::Limit)),
+            2 => rig.happens(Effect::Stop(StopReason::Limit(Side::X1))),
             3 => rig.happens(Effect::Resume),
             byte => rig.receive(&[byte]),
         }

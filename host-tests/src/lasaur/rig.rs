@@ -1,8 +1,8 @@
 //! A serial session with a plan in place of a machine: moves stay in it until the test takes them out.
 
-use protocol_core::lasaur::{
-    Effect, Event, Facts, Point, READY, Reply, Session, Step, Steps, StopReason,
-};
+use protocol_core::lasaur::{Effect, Event, Facts, READY, Reply, Session, Step, Steps};
+use protocol_core::machine::StopReason;
+use protocol_core::motion::TablePoint;
 use std::collections::VecDeque;
 
 /// A session, and everything that came of it.
@@ -12,7 +12,7 @@ pub struct Rig {
     /// What the session is told.
     pub facts: Facts,
     /// Moves that are planned and not yet done.
-    plan: VecDeque<Point>,
+    plan: VecDeque<TablePoint>,
     capacity: usize,
     /// Steps of the line that was begun.
     begun: Option<VecDeque<Step>>,
@@ -128,14 +128,14 @@ impl Rig {
             }
             assert_eq!(self.facts.stop, None, "{step:?} in stop mode");
             match step {
-                Step::Move { .. } if self.plan.len() >= self.capacity => {
+                Step::Move(_) if self.plan.len() >= self.capacity => {
                     steps.push_front(step);
                     self.begun = Some(steps);
                     return;
                 }
-                Step::Move { target, .. } => {
-                    self.plan.push_back(target);
-                    self.facts.planned = target;
+                Step::Move(segment) => {
+                    self.plan.push_back(segment.to);
+                    self.facts.planned = segment.to;
                 }
                 Step::Home => {
                     self.plan.clear();

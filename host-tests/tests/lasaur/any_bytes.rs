@@ -5,7 +5,9 @@ use host_tests::lasaur::rig::Rig;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
-use protocol_core::lasaur::{Effect, Session, StopReason};
+use protocol_core::lasaur::{Effect, Session};
+use protocol_core::machine::StopReason;
+use protocol_core::motion::Side;
 use std::fmt;
 
 /// What happens to a session.
@@ -42,7 +44,7 @@ fn happenings() -> impl Strategy<Value = Vec<Happening>> {
         8 => bytes.prop_map(Happening::Bytes),
         2 => Just(Happening::Work),
         1 => select(&[
-            Effect::Stop(StopReason::Limit), Effect::Stop(StopReason::Power), Effect::Resume,
+            Effect::Stop(StopReason::Limit(Side::Y2)), Effect::Stop(StopReason::Power), Effect::Resume,
         ][..]).prop_map(Happening::Machine),
     ];
     vec(one, 0..60)

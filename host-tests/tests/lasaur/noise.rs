@@ -12,7 +12,9 @@
 
 use host_tests::lasaur::oracle::{checksum, kept, with_checksum};
 use host_tests::lasaur::rig::Rig;
-use protocol_core::lasaur::{Point, Step, StopReason};
+use protocol_core::lasaur::Step;
+use protocol_core::machine::StopReason;
+use protocol_core::motion::TablePoint;
 
 const LINES: usize = 5_000;
 
@@ -48,7 +50,7 @@ fn job() -> Vec<String> {
 }
 
 /// Where a line goes from somewhere.
-fn from(start: Point, line: &[u8]) -> Option<Point> {
+fn from(start: TablePoint, line: &[u8]) -> Option<TablePoint> {
     let mut rig = Rig::roomy();
     rig.facts.planned = start;
     rig.receive(&[line, b"\n"].concat());
@@ -56,7 +58,7 @@ fn from(start: Point, line: &[u8]) -> Option<Point> {
 }
 
 /// Where the lines go, by what an undisturbed session makes of them.
-fn targets(lines: &[String]) -> Vec<Point> {
+fn targets(lines: &[String]) -> Vec<TablePoint> {
     let mut rig = Rig::roomy();
     lines
         .iter()
@@ -64,9 +66,9 @@ fn targets(lines: &[String]) -> Vec<Point> {
     rig.taken.iter().map(target).collect()
 }
 
-fn target(step: &Step) -> Point {
+fn target(step: &Step) -> TablePoint {
     match step {
-        Step::Move { target, .. } => *target,
+        Step::Move(segment) => segment.to,
         step => panic!("{step:?} is no move"),
     }
 }
@@ -157,12 +159,12 @@ struct Outcome {
     wrong: usize,
 }
 
-fn send_with_any_noise(seed: u64, job: &[String], targets: &[Point]) -> Outcome {
+fn send_with_any_noise(seed: u64, job: &[String], targets: &[TablePoint]) -> Outcome {
     let (mut rig, mut noise) = (Rig::roomy(), Noise(seed));
     let (mut outcome, mut blind_for, mut wrong) = (Outcome::default(), Vec::new(), Vec::new());
     // A final line without its newline is one with the next line, and stops the run there.
     let mut lost_before = false;
-    let mut at = Point::default();
+    let mut at = TablePoint::HOME;
     for (line, expected) in job.iter().zip(targets) {
         let (taken, answered) = (rig.taken.len(), rig.replies.len());
         let (mut received, mut stopped) = (Vec::new(), false);
@@ -188,7 +190,7 @@ fn send_with_any_noise(seed: u64, job: &[String], targets: &[Point]) -> Outcome 
         let told = rig.replies[answered..]
             .iter()
             .any(|reply| matches!(reply[0], b'N' | b'E' | b'U'));
-        let executed: Vec<Point> = rig.taken[taken..].iter().map(target).collect();
+        let executed: Vec<TablePoint> = rig.taken[taken..].iter().map(target).collect();
         let times = executed.iter().filter(|&target| target == expected).count();
         let count = match times {
             0 if stopped => &mut outcome.stopped,

@@ -2,9 +2,9 @@
 
 use host_tests::lasaur::host::{LasaurApp, LaserWeb};
 use host_tests::lasaur::rig::Rig;
-use protocol_core::lasaur::{
-    Assist, BANNER, Feed, Millimetres, Point, Step, StopReason, Travel, VERSION,
-};
+use protocol_core::lasaur::{Assist, BANNER, Step, VERSION};
+use protocol_core::machine::StopReason;
+use protocol_core::motion::{Feed, Intensity, Millimetres, Segment, TablePoint};
 
 /// Pieces as they may be cut on the way, bytes at a time.
 const CUTS: [usize; 6] = [1, 2, 3, 7, 16, 300];
@@ -47,13 +47,20 @@ fn all(host: &mut LasaurApp, rig: &mut Rig, cut: usize, bodies: &[&str]) -> Vec<
     host.lines.clone()
 }
 
-fn seek(x: i16, y: i16) -> Step {
-    Step::Move {
-        travel: Travel::Seek,
-        target: Point::new(x + 5, y + 5),
-        feed: Feed::new(8000),
-        intensity: 0,
+/// From the default offset.
+fn place(x: i16, y: i16) -> TablePoint {
+    TablePoint {
+        x: Millimetres::new(x + 5),
+        y: Millimetres::new(y + 5),
     }
+}
+
+fn seek(x: i16, y: i16) -> Step {
+    Step::Move(Segment {
+        to: place(x, y),
+        feed: Feed::DEFAULT,
+        intensity: Intensity::OFF,
+    })
 }
 
 #[test]
@@ -158,25 +165,16 @@ fn lasaurapp_runs_a_job() {
                 let code = if corner == 0 { "G00" } else { "G01" };
                 job.push(format!("{code}X{x}.{:03}Y{y}.000", 125 * round));
                 let eighths = 8 * (x + 5) + i32::from(round);
-                let target = Point {
+                let to = TablePoint {
                     x: Millimetres::from_bits(eighths << (Millimetres::FRACTION_BITS - 3)),
-                    y: Point::new(0, y + 5).y,
+                    ..place(0, y)
                 };
-                expected.push(if corner == 0 {
-                    Step::Move {
-                        travel: Travel::Seek,
-                        target,
-                        feed: Feed::new(8000),
-                        intensity: 0,
-                    }
-                } else {
-                    Step::Move {
-                        travel: Travel::Feed,
-                        target,
-                        feed: Feed::new(1500),
-                        intensity: 128,
-                    }
-                });
+                let (rate, intensity) = if corner == 0 { (8000, 0) } else { (1500, 128) };
+                expected.push(Step::Move(Segment {
+                    to,
+                    feed: Feed::new(rate),
+                    intensity: Intensity(intensity),
+                }));
             }
         }
         job.extend(["M81".to_string(), "S0".into(), "G0X0Y0F8000".into()]);
@@ -238,6 +236,6 @@ fn laserweb_probes_and_goes_on_after_each_empty_reply() {
         }
         assert!(host.is_idle());
         assert_eq!(rig.taken.len(), 4);
-        assert_eq!(rig.facts.position, Point::new(5, 5));
+        assert_eq!(rig.facts.position, place(0, 0));
     }
 }

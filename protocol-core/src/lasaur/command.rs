@@ -3,13 +3,10 @@
 //! In two passes, as the original does it: all G and M words first, then the parameters, so that
 //! `X1G20` is an inch. A body is accepted whole or refused whole.
 
-use super::units::{BadNumber, Feed, Millimetres, Unit};
+use super::units::{BadNumber, Unit};
 use super::words::Words;
-use crate::motion::Micros;
+use crate::motion::{Feed, Intensity, MOST_DWELL, Micros, Millimetres};
 use crate::text::Decimal;
-
-/// Longest dwell (G4), in seconds.
-pub const MAX_DWELL: u32 = 3600;
 
 /// Why a body is refused; nothing has changed then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +103,7 @@ pub struct Command {
     /// F.
     pub feed: Option<Feed>,
     /// S.
-    pub intensity: Option<u8>,
+    pub intensity: Option<Intensity>,
     /// The last of G0 and G1, which says what F is for from now on.
     pub travel: Option<Travel>,
 }
@@ -200,16 +197,19 @@ fn miscellaneous(command: &mut Command, number: Decimal) -> Result<(), Fault> {
 }
 
 /// S in 0..=255; a fraction is dropped, as the original does it.
-fn intensity(number: Decimal) -> Result<u8, BadNumber> {
+fn intensity(number: Decimal) -> Result<Intensity, BadNumber> {
     const BITS: u32 = 16;
     let bits = number.to_fixed(BITS, u8::MAX.into())?;
-    u8::try_from(bits >> BITS).map_err(|_| BadNumber)
+    let whole = u8::try_from(bits >> BITS).map_err(|_| BadNumber)?;
+    Ok(Intensity(whole))
 }
 
+/// P in seconds, at most [`MOST_DWELL`].
 fn dwell(seconds: Decimal) -> Result<Micros, BadNumber> {
     const BITS: u32 = 24;
+    const MOST: u32 = (MOST_DWELL.get() / 1_000_000) as u32;
     // Below 2^36, times a million below 2^56.
-    let bits = u64::try_from(seconds.to_fixed(BITS, MAX_DWELL)?).map_err(|_| BadNumber)?;
+    let bits = u64::try_from(seconds.to_fixed(BITS, MOST)?).map_err(|_| BadNumber)?;
     Ok(Micros::new((bits * 1_000_000 + (1 << (BITS - 1))) >> BITS))
 }
 
@@ -261,8 +261,8 @@ mod tests {
             ("M83", with(|it| it.outputs = [None, Some(false), None])),
             ("M84", with(|it| it.outputs = [None, None, Some(true)])),
             ("M85", with(|it| it.outputs = [None, None, Some(false)])),
-            ("S0", with(|it| it.intensity = Some(0))),
-            ("S255", with(|it| it.intensity = Some(255))),
+            ("S0", with(|it| it.intensity = Some(Intensity(0)))),
+            ("S255", with(|it| it.intensity = Some(Intensity(255)))),
             ("F2000", with(|it| it.feed = Some(Feed::new(2000)))),
             ("X120Y150", with(|it| (it.x, it.y) = (mm(120), mm(150)))),
             (
@@ -389,7 +389,7 @@ mod tests {
             ("S-1", Err(Fault::BadNumber)),
             ("S1E9", Err(Fault::BadNumber)),
         ] {
-            let found = millimetres(body).map(|command| command.intensity.unwrap());
+            let found = millimetres(body).map(|command| command.intensity.unwrap().0);
             assert_eq!(found, expected, "{body}");
         }
     }
@@ -424,7 +424,6 @@ mod tests {
             ("G1XY", BadNumber),
             ("X10000.001", BadNumber),
             ("Y-1E30", BadNumber),
-            ("F1000001", BadNumber),
             ("TX", BadNumber),
             // Letters.
             ("g1x5", ExpectedLetter),

@@ -30,10 +30,9 @@ mod units;
 mod words;
 
 pub use checksum::{checksum, is_right};
-pub use command::{Assist, Fault, MAX_DWELL, Travel};
-pub use modal::{DEFAULT_FEED, DEFAULT_OFFSET, MAX_STEPS, Step, Steps};
+pub use command::{Assist, Fault};
+pub use modal::{DEFAULT_OFFSET, MAX_STEPS, Step, Steps};
 pub use receive::{CHUNK, Effect, MAX_LINE, READY, RECEIVE_BUFFER};
 pub use reply::{BANNER, MAX_REPLY, Reply, Sensors, VERSION};
 pub use session::{Event, Facts, Line, Session};
-pub use stop::StopReason;
-pub use units::{Feed, MAX_COORDINATE, MAX_FEED, Millimetres, Point};
+pub use units::MAX_COORDINATE;

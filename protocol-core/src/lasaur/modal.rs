@@ -6,14 +6,12 @@
 //! that. So nothing a line does, or does not, can shift them.
 
 use super::command::{Action, Assist, Command, Distance, Fault, Offset, Travel};
-use super::units::{Feed, Millimetres, Point, Unit};
-use crate::motion::Micros;
+use super::units::{Unit, place, sum};
+use crate::motion::{Feed, Intensity, Micros, Millimetres, Segment, TablePoint};
 use heapless::Vec;
 
-/// Seek and feed rate of a new session, in mm/min.
-pub const DEFAULT_FEED: Feed = Feed::new(8000);
 /// Both offsets of a new session.
-pub const DEFAULT_OFFSET: Point = Point::new(5, 5);
+pub const DEFAULT_OFFSET: TablePoint = place(5, 5);
 
 /// Steps of one line at most: three outputs, home, a move.
 pub const MAX_STEPS: usize = 5;
@@ -21,23 +19,14 @@ pub const MAX_STEPS: usize = 5;
 /// One thing to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Go there, in a straight line.
-    Move {
-        /// G0 or G1.
-        travel: Travel,
-        /// Within twice [`super::MAX_COORDINATE`], wherever the table ends.
-        target: Point,
-        /// The rate of G0 or G1.
-        feed: Feed,
-        /// Of the laser, 0 for off; always off with G0.
-        intensity: u8,
-    },
+    /// Go there: within twice [`super::MAX_COORDINATE`], wherever the table ends.
+    Move(Segment),
     /// Stay there.
     Dwell {
         /// For how long.
         time: Micros,
-        /// Of the laser, 0 for off.
-        intensity: u8,
+        /// Of the laser.
+        intensity: Intensity,
     },
     /// Go to the physical home and make it zero. The move after it must not be seen from elsewhere.
     Home,
@@ -54,13 +43,13 @@ pub struct Modal {
     unit: Unit,
     distance: Distance,
     selected: Offset,
-    table: Point,
-    custom: Point,
+    table: TablePoint,
+    custom: TablePoint,
     /// The last of G0 and G1: F before either is the feed rate.
     travel: Travel,
     seek: Feed,
     feed: Feed,
-    intensity: u8,
+    intensity: Intensity,
 }
 
 impl Modal {
@@ -72,9 +61,9 @@ impl Modal {
         table: DEFAULT_OFFSET,
         custom: DEFAULT_OFFSET,
         travel: Travel::Feed,
-        seek: DEFAULT_FEED,
-        feed: DEFAULT_FEED,
-        intensity: 0,
+        seek: Feed::DEFAULT,
+        feed: Feed::DEFAULT,
+        intensity: Intensity::OFF,
     };
 
     /// What numbers are in.
@@ -86,7 +75,7 @@ impl Modal {
     ///
     /// # Errors
     /// [`Fault::BadNumber`] for a target beyond every table.
-    pub fn after(mut self, command: &Command, planned: Point) -> Result<(Self, Steps), Fault> {
+    pub fn after(mut self, command: &Command, planned: TablePoint) -> Result<(Self, Steps), Fault> {
         self.unit = command.unit.unwrap_or(self.unit);
         self.distance = command.distance.unwrap_or(self.distance);
         self.selected = command.offset.unwrap_or(self.selected);
@@ -135,42 +124,44 @@ impl Modal {
         Ok((self, steps))
     }
 
-    const fn offset_mut(&mut self, offset: Offset) -> &mut Point {
+    const fn offset_mut(&mut self, offset: Offset) -> &mut TablePoint {
         match offset {
             Offset::Table => &mut self.table,
             Offset::Custom => &mut self.custom,
         }
     }
 
-    fn target(&self, command: &Command, planned: Point) -> Option<Point> {
+    fn target(&self, command: &Command, planned: TablePoint) -> Option<TablePoint> {
         let offset = match self.selected {
             Offset::Table => self.table,
             Offset::Custom => self.custom,
         };
         let coordinate = |written: Option<Millimetres>, offset, planned| match written {
             None => Some(planned),
-            Some(written) => written.checked_add(match self.distance {
-                Distance::Absolute => offset,
-                Distance::Relative => planned,
-            }),
+            Some(written) => {
+                let from = match self.distance {
+                    Distance::Absolute => offset,
+                    Distance::Relative => planned,
+                };
+                sum(written, from)
+            }
         };
-        Some(Point {
+        Some(TablePoint {
             x: coordinate(command.x, offset.x, planned.x)?,
             y: coordinate(command.y, offset.y, planned.y)?,
         })
     }
 
-    const fn travel_to(&self, travel: Travel, target: Point) -> Step {
+    const fn travel_to(&self, travel: Travel, to: TablePoint) -> Step {
         let (feed, intensity) = match travel {
-            Travel::Seek => (self.seek, 0),
+            Travel::Seek => (self.seek, Intensity::OFF),
             Travel::Feed => (self.feed, self.intensity),
         };
-        Step::Move {
-            travel,
-            target,
+        Step::Move(Segment {
+            to,
             feed,
             intensity,
-        }
+        })
     }
 }
 
@@ -191,14 +182,14 @@ mod tests {
     /// A session's state and an arm that is always where the plan ends.
     struct Arm {
         modal: Modal,
-        at: Point,
+        at: TablePoint,
     }
 
     impl Arm {
         fn new() -> Self {
             Self {
                 modal: Modal::DEFAULT,
-                at: Point::default(),
+                at: TablePoint::default(),
             }
         }
 
@@ -209,8 +200,8 @@ mod tests {
             self.modal = modal;
             for step in &steps {
                 match step {
-                    Step::Move { target, .. } => self.at = *target,
-                    Step::Home => self.at = Point::default(),
+                    Step::Move(segment) => self.at = segment.to,
+                    Step::Home => self.at = TablePoint::default(),
                     Step::Dwell { .. } | Step::Output(..) => {}
                 }
             }
@@ -230,22 +221,16 @@ mod tests {
         Arm::new().lines(lines).iter().copied().collect()
     }
 
-    fn seek(x: i16, y: i16, feed: u16) -> Step {
-        Step::Move {
-            travel: Travel::Seek,
-            target: Point::new(x, y),
-            feed: Feed::new(feed),
-            intensity: 0,
-        }
+    fn seek(x: i16, y: i16, rate: u16) -> Step {
+        feed(x, y, rate, 0)
     }
 
-    fn feed(x: i16, y: i16, feed: u16, intensity: u8) -> Step {
-        Step::Move {
-            travel: Travel::Feed,
-            target: Point::new(x, y),
-            feed: Feed::new(feed),
-            intensity,
-        }
+    fn feed(x: i16, y: i16, rate: u16, intensity: u8) -> Step {
+        Step::Move(Segment {
+            to: place(x, y),
+            feed: Feed::new(rate),
+            intensity: Intensity(intensity),
+        })
     }
 
     #[test]
@@ -269,7 +254,7 @@ mod tests {
                 &["S9", "G4 P0.5"],
                 vec![Step::Dwell {
                     time: Micros::new(500_000),
-                    intensity: 9,
+                    intensity: Intensity(9),
                 }],
             ),
             (
@@ -389,11 +374,7 @@ mod tests {
             arm.lines(&["G10L2P1X50Y60", "G0X10Y10"]);
             let before = arm.at;
             arm.lines(&[change]);
-            let at = if change == "G30" {
-                Point::new(5, 5)
-            } else {
-                before
-            };
+            let at = if change == "G30" { place(5, 5) } else { before };
             assert_eq!(arm.at, at, "{change}");
             arm.lines(&["G91", "G1X1", "G90"]);
             assert_eq!(arm.at.y, at.y, "{change}");

@@ -11,7 +11,7 @@
 //! complete when a stop came, or that was ended in stop mode, or that lost a byte, is *void* and will not be
 //! executed, however soon stop mode is left.
 
-use super::stop::StopReason;
+use crate::machine::StopReason;
 use heapless::{Deque, Vec};
 
 /// Bytes that may wait behind a line that is being executed; one more is lost, and stops the machine.

@@ -5,8 +5,9 @@
 
 use super::command::Fault;
 use super::receive::MAX_LINE;
-use super::stop::StopReason;
-use super::units::Point;
+use super::stop::Letter;
+use crate::machine::StopReason;
+use crate::motion::{Millimetres, TablePoint};
 use core::fmt::{self, Write};
 use heapless::Vec;
 
@@ -62,7 +63,19 @@ pub(super) enum Answer {
     /// The body was refused.
     Refused(Fault),
     /// Where the arm is, after the sensors.
-    Status(Point),
+    Status(TablePoint),
+}
+
+/// A coordinate with three decimals, rounded to the nearest, without a minus before zero.
+struct Thousandths(Millimetres);
+
+impl fmt::Display for Thousandths {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rounded = self.0.micrometres();
+        let sign = if rounded < 0 { "-" } else { "" };
+        let (whole, part) = (rounded.abs() / 1000, rounded.abs() % 1000);
+        write!(out, "{sign}{whole}.{part:03}")
+    }
 }
 
 /// One reply.
@@ -86,7 +99,7 @@ impl Reply {
         self.bytes.clear();
         match answer {
             Answer::Bare | Answer::Status(_) => {}
-            Answer::Stopped(reason) => self.write(format_args!("!{reason}")),
+            Answer::Stopped(reason) => self.write(format_args!("!{}", Letter(reason))),
             Answer::Wrong => self.push(b"^"),
             Answer::Failed => self.push(line),
             Answer::NoChecksum => {
@@ -113,7 +126,8 @@ impl Reply {
                 self.push(flag);
             }
         }
-        if let Answer::Status(Point { x, y }) = answer {
+        if let Answer::Status(TablePoint { x, y }) = answer {
+            let (x, y) = (Thousandths(x), Thousandths(y));
             self.write(format_args!("X{x}Y{y}V{VERSION}"));
         }
         self.push(b"\n");
@@ -132,7 +146,9 @@ impl Reply {
 #[cfg(test)]
 mod tests {
     extern crate std;
+    use super::super::units::place;
     use super::*;
+    use crate::motion::Side;
     use std::string::{String, ToString};
 
     const ALL: Sensors = Sensors {
@@ -157,13 +173,17 @@ mod tests {
             ..Sensors::default()
         };
         let none = Sensors::default();
-        let place = Answer::Status(Point::new(6, -5));
+        let there = Answer::Status(place(6, -5));
         let status = std::format!("X6.000Y-5.000V{VERSION}\\n");
         for (answer, sensors, expected) in [
             (Answer::Bare, none, "\\n"),
             (Answer::Bare, ALL, "DCPL1L2L3L4\\n"),
             (Answer::Stopped(StopReason::Requested), none, "!R\\n"),
-            (Answer::Stopped(StopReason::Limit), some, "!LDCL2\\n"),
+            (
+                Answer::Stopped(StopReason::Limit(Side::X2)),
+                some,
+                "!LDCL2\\n",
+            ),
             (
                 Answer::Stopped(StopReason::Other(250)),
                 some,
@@ -180,8 +200,8 @@ mod tests {
                 some,
                 "*\\xffline -> checksum outside [128,255]DCL2\\n",
             ),
-            (place, none, &status),
-            (place, ALL, &("DCPL1L2L3L4".to_string() + &status)),
+            (there, none, &status),
+            (there, ALL, &("DCPL1L2L3L4".to_string() + &status)),
         ] {
             assert_eq!(said(answer, sensors), expected, "{answer:?}");
         }
@@ -232,8 +252,8 @@ mod tests {
         let mut reply = Reply::new();
         reply.compose(Answer::NoChecksum, &line, ALL);
         assert!(reply.as_bytes().ends_with(b"[128,255]DCPL1L2L3L4\n"));
-        let far = super::super::Millimetres::from_bits(i32::MIN);
-        reply.compose(Answer::Status(Point { x: far, y: far }), &line, ALL);
+        let far = Millimetres::from_bits(i32::MIN);
+        reply.compose(Answer::Status(TablePoint { x: far, y: far }), &line, ALL);
         assert!(reply.as_bytes().ends_with(b"-quill\n"));
     }
 
@@ -241,5 +261,23 @@ mod tests {
     fn the_banner_is_what_hosts_look_for() {
         assert_eq!(BANNER, std::format!("# LasaurGrbl {VERSION}\n"));
         assert!(!VERSION.contains(|letter: char| letter.is_uppercase()));
+    }
+
+    #[test]
+    fn three_decimals_rounded_to_the_nearest() {
+        for (bits, text) in [
+            (0, "0.000"),
+            (1 << 16, "1.000"),
+            (-(1 << 16), "-1.000"),
+            (32, "0.000"),
+            (-32, "0.000"),
+            (33, "0.001"),
+            (-33, "-0.001"),
+            (i32::MAX, "32768.000"),
+            (i32::MIN, "-32768.000"),
+        ] {
+            let shown = Thousandths(Millimetres::from_bits(bits)).to_string();
+            assert_eq!(shown, text, "{bits}");
+        }
     }
 }

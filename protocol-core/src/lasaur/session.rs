@@ -5,8 +5,8 @@ use super::modal::{Modal, Steps};
 use super::receive::{Effect, Receiver};
 use super::redundancy::{Group, Verdict};
 use super::reply::{Answer, Reply, Sensors};
-use super::stop::StopReason;
-use super::units::Point;
+use crate::machine::{Machine, StopReason};
+use crate::motion::{Side, TablePoint};
 
 /// What the machine is like at this moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,9 +16,30 @@ pub struct Facts {
     /// What it senses.
     pub sensors: Sensors,
     /// Where the arm is.
-    pub position: Point,
+    pub position: TablePoint,
     /// Where the arm will be when everything in its plan is done.
-    pub planned: Point,
+    pub planned: TablePoint,
+}
+
+impl Facts {
+    /// Of the arm, with what else the board senses.
+    pub fn of(machine: &Machine, mut sensors: Sensors) -> Self {
+        if let Some(side) = machine.limit() {
+            let [x1, x2, y1, y2] = &mut sensors.limits;
+            *match side {
+                Side::X1 => x1,
+                Side::X2 => x2,
+                Side::Y1 => y1,
+                Side::Y2 => y2,
+            } = true;
+        }
+        Self {
+            stop: machine.stopped(),
+            sensors,
+            position: machine.table_position(),
+            planned: machine.planned_position(),
+        }
+    }
 }
 
 /// What is to be done next.
@@ -177,7 +198,7 @@ impl Session {
     }
 }
 
-fn execute(body: &[u8], modal: Modal, planned: Point) -> Result<(Modal, Steps), Fault> {
+fn execute(body: &[u8], modal: Modal, planned: TablePoint) -> Result<(Modal, Steps), Fault> {
     let command = parse(body, modal.unit())?;
     modal.after(&command, planned)
 }

@@ -1,36 +1,21 @@
-//! Why the machine is in stop mode (`spec lasaurgrbl, Flag Characters`).
+//! How a reply names the reason of a stop (`spec lasaurgrbl, Flag Characters`).
 
+use crate::machine::StopReason;
 use core::fmt;
 
-/// A reason to stop. The last cause wins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopReason {
-    /// `P`: loss of power.
-    Power,
-    /// `L`: a limit was hit.
-    Limit,
-    /// `R`: `!`.
-    Requested,
-    /// `B`: more bytes than the receive buffer holds.
-    ReceiveOverflow,
-    /// `I`: a line longer than there may be.
-    LineOverflow,
-    /// `T`: a line whose checksum was wrong to the end.
-    Transmission,
-    /// `O` and a number: anything else.
-    Other(u8),
-}
+/// A reason as its letter, `O` with its number.
+pub(super) struct Letter(pub(super) StopReason);
 
-impl fmt::Display for StopReason {
+impl fmt::Display for Letter {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(match self {
-            Self::Power => "P",
-            Self::Limit => "L",
-            Self::Requested => "R",
-            Self::ReceiveOverflow => "B",
-            Self::LineOverflow => "I",
-            Self::Transmission => "T",
-            Self::Other(number) => return write!(out, "O{number}"),
+        out.write_str(match self.0 {
+            StopReason::Power => "P",
+            StopReason::Limit(_) => "L",
+            StopReason::Requested => "R",
+            StopReason::ReceiveOverflow => "B",
+            StopReason::LineOverflow => "I",
+            StopReason::Transmission => "T",
+            StopReason::Other(number) => return write!(out, "O{number}"),
         })
     }
 }
@@ -39,20 +24,21 @@ impl fmt::Display for StopReason {
 mod tests {
     extern crate std;
     use super::*;
+    use crate::motion::Side;
     use std::string::ToString;
 
     #[test]
     fn letters_of_the_page() {
         for (reason, letter) in [
             (StopReason::Power, "P"),
-            (StopReason::Limit, "L"),
+            (StopReason::Limit(Side::X2), "L"),
             (StopReason::Requested, "R"),
             (StopReason::ReceiveOverflow, "B"),
             (StopReason::LineOverflow, "I"),
             (StopReason::Transmission, "T"),
             (StopReason::Other(7), "O7"),
         ] {
-            assert_eq!(reason.to_string(), letter);
+            assert_eq!(Letter(reason).to_string(), letter);
         }
     }
 }

@@ -90,6 +90,13 @@ impl Machine {
         self.data.plan.table.to_table(x, y)
     }
 
+    /// Where the last thing planned ends, on the table: where the host knows the arm, and where the next
+    /// way begins. After a stop it is where the arm was stopped.
+    pub fn planned_position(&self) -> TablePoint {
+        let (x, y) = self.plan.end();
+        self.data.plan.table.to_table(x, y)
+    }
+
     /// Stops the arm, whoever moves it: it stays where it is, the pen rises in place, the plan is
     /// forgotten, and moves that wait are answered with [`Report::Stopped`]. The last reason counts.
     pub fn stop(&mut self, reason: StopReason) {

@@ -152,6 +152,11 @@ impl Planner {
         PLAN_SEGMENTS.saturating_sub(self.queue.len())
     }
 
+    /// Where the next way begins.
+    pub(crate) fn end(&self) -> Place {
+        self.table.closest(self.end)
+    }
+
     /// Whether the plan has the arm.
     pub(crate) const fn has_the_arm(&self) -> bool {
         !matches!(self.stage, Stage::Idle)
@@ -181,7 +186,7 @@ impl Planner {
 
     /// Adds a segment. The set-points up to `told` have been given, what comes later can be planned anew.
     pub(crate) fn segment(&mut self, segment: &Segment, told: Micros) -> Result<(), Full> {
-        let from = self.table.closest(self.end);
+        let from = self.end();
         let (to, leaves) = self.table.aim(from, segment.to);
         // The arm may be elsewhere when the first segment begins.
         let goes_on = self.has_the_arm() || !self.queue.is_empty();
@@ -205,7 +210,7 @@ impl Planner {
         if self.leads_off || duration == Micros::default() {
             return Ok(());
         }
-        let at = self.table.closest(self.end);
+        let at = self.end();
         self.push(Block::dwell(at, duration, intensity), told)
     }
 

@@ -1,9 +1,11 @@
 //! Sessions as hosts meet them: bytes in, replies out. The machine here does every step at once, or is full.
 
 extern crate std;
-use super::super::{MAX_LINE, RECEIVE_BUFFER, Travel, VERSION};
+use super::super::units::place;
+use super::super::{MAX_LINE, RECEIVE_BUFFER, VERSION};
 use super::*;
-use crate::lasaur::{Assist, Feed, READY, Step, checksum};
+use crate::lasaur::{Assist, READY, Step, checksum};
+use crate::motion::{Feed, Intensity, Segment};
 use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
@@ -59,12 +61,12 @@ impl Rig {
                 break;
             }
             match step {
-                Step::Move { .. } if self.full => {
+                Step::Move(_) if self.full => {
                     self.waiting.as_mut().unwrap().push(step);
                     return;
                 }
-                Step::Move { target, .. } => self.facts.planned = target,
-                Step::Home => self.facts.planned = Point::default(),
+                Step::Move(segment) => self.facts.planned = segment.to,
+                Step::Home => self.facts.planned = TablePoint::HOME,
                 Step::Dwell { .. } | Step::Output(..) => {}
             }
             self.done.push(step);
@@ -93,9 +95,9 @@ impl Rig {
         self.sent.escape_ascii().to_string()
     }
 
-    fn targets(&self) -> Vec<Point> {
+    fn targets(&self) -> Vec<TablePoint> {
         let target = |step: &Step| match step {
-            Step::Move { target, .. } => Some(*target),
+            Step::Move(segment) => Some(segment.to),
             _ => None,
         };
         self.done.iter().filter_map(target).collect()
@@ -162,12 +164,12 @@ fn a_right_redundant_line_is_executed_at_once_and_once() {
     let sum = checksum(body) as u8;
     let line = |prefix: u8| [&[prefix, sum][..], body, b"\n"].concat();
     rig.receive(&line(b'^'));
-    assert_eq!(rig.targets(), [Point::new(1, 0)]);
+    assert_eq!(rig.targets(), [place(1, 0)]);
     rig.receive(&line(b'^'));
     rig.receive(&line(b'*'));
-    assert_eq!(rig.targets(), [Point::new(1, 0)]);
+    assert_eq!(rig.targets(), [place(1, 0)]);
     rig.receive(&line(b'*'));
-    assert_eq!(rig.targets(), [Point::new(1, 0), Point::new(2, 0)]);
+    assert_eq!(rig.targets(), [place(1, 0), place(2, 0)]);
 }
 
 #[test]
@@ -176,12 +178,11 @@ fn the_body_of_a_wrong_line_is_not_parsed() {
     assert_eq!(rig.say(b"*\x80G0X5M99F0\n"), "*\\x80G0X5M99F0\\n");
     assert_eq!(rig.done, []);
     rig.say(b"~*\xa1S99\n~G1X0Y0\n");
-    let step = Step::Move {
-        travel: Travel::Feed,
-        target: Point::new(5, 5),
-        feed: Feed::new(8000),
-        intensity: 0,
-    };
+    let step = Step::Move(Segment {
+        to: place(5, 5),
+        feed: Feed::DEFAULT,
+        intensity: Intensity::OFF,
+    });
     assert_eq!(rig.done, [step], "neither moved nor kept");
 }
 
@@ -216,7 +217,7 @@ fn resuming_as_hosts_do_it() {
 fn every_reason_is_told_and_the_last_cause_wins() {
     for (reason, reply) in [
         (StopReason::Power, "!PDL2\\n"),
-        (StopReason::Limit, "!LDL2\\n"),
+        (StopReason::Limit(Side::X2), "!LDL2\\n"),
         (StopReason::Requested, "!RDL2\\n"),
         (StopReason::ReceiveOverflow, "!BDL2\\n"),
         (StopReason::LineOverflow, "!IDL2\\n"),
@@ -245,7 +246,7 @@ fn a_stop_between_redundant_and_final_line_drops_nothing_of_the_next_group() {
     // A limit, of which no byte tells.
     let mut rig = Rig::default();
     rig.receive(b"^\x98G90\n");
-    rig.facts.stop = Some(StopReason::Limit);
+    rig.facts.stop = Some(StopReason::Limit(Side::X2));
     assert_eq!(rig.say(b"*\x98G90\n"), "!L\\n");
     rig.receive(b"~");
     assert_eq!(rig.say(b"^\x9aM80\n*\x9aM80\n"), "\\n\\n");
@@ -277,7 +278,7 @@ fn a_line_waits_for_room_and_its_reply_with_it() {
         rig.sent.escape_ascii().to_string(),
         std::format!("\\n\\n{status}\\n")
     );
-    assert_eq!(rig.targets(), [Point::new(6, 6), Point::new(7, 6)]);
+    assert_eq!(rig.targets(), [place(6, 6), place(7, 6)]);
 }
 
 #[test]
@@ -292,12 +293,11 @@ fn a_stop_while_a_line_waits_discards_it_and_all_behind_it() {
         assert_eq!(rig.say(stop), "!R\\n!R\\n!R\\n");
         rig.full = false;
         assert_eq!(rig.say(b"~G1X0Y0\n"), "\\n");
-        let step = Step::Move {
-            travel: Travel::Feed,
-            target: Point::new(5, 5),
-            feed: Feed::new(8000),
-            intensity: 0,
-        };
+        let step = Step::Move(Segment {
+            to: place(5, 5),
+            feed: Feed::DEFAULT,
+            intensity: Intensity::OFF,
+        });
         assert_eq!(rig.done, [step], "nothing of the discarded lines is kept");
     }
 }
@@ -320,11 +320,11 @@ fn after_a_stop_omitted_axes_stay_where_the_arm_is() {
     let mut rig = Rig::default();
     rig.receive(b"G0X10Y20\nG0X40\n!");
     // On the way it was.
-    rig.facts.planned = Point::new(31, 25);
+    rig.facts.planned = place(31, 25);
     rig.receive(b"~G1Y0\n");
-    assert_eq!(rig.targets()[2], Point::new(31, 5));
+    assert_eq!(rig.targets()[2], place(31, 5));
     rig.receive(b"G91\nG1X1\n");
-    assert_eq!(rig.targets()[3], Point::new(32, 5));
+    assert_eq!(rig.targets()[3], place(32, 5));
 }
 
 #[test]
@@ -428,5 +428,5 @@ fn home_answers_when_it_is_done() {
     rig.sent.clear();
     rig.room();
     assert_eq!(rig.sent, b"\n");
-    assert_eq!(rig.targets(), [Point::new(9, 8)]);
+    assert_eq!(rig.targets(), [place(9, 8)]);
 }
