@@ -13,22 +13,25 @@
 
 mod block;
 mod feed;
+mod look_ahead;
 mod moment;
 mod pen;
 mod profile;
+mod stages;
 
 pub use block::{MOST_DWELL, Segment};
 pub use feed::{Acceleration, Feed, LEAST_FEED, MOST_FEED};
 pub use pen::{Intensity, PenDepth};
+pub(crate) use stages::PlanEvent;
 
-use super::table::{Millimetres, Side, Table, UNITS_PER_MILLIMETRE};
-use super::units::{Coordinate, HOME, Micros, PEN_UP, Position};
+use super::table::{Millimetres, Table, UNITS_PER_MILLIMETRE};
+use super::units::{HOME, Micros, PEN_UP, Position};
 use crate::arm::PenLift;
 use block::{Block, Limits, Place};
 use heapless::Deque;
-use moment::{Moment, fine};
+use moment::Moment;
 use pen::Pen;
-use profile::{Profile, Task};
+use stages::Stage;
 
 /// Segments that wait; the next one does not fit until one of them has begun.
 pub const PLAN_SEGMENTS: usize = 32;
@@ -49,7 +52,7 @@ pub struct PlanData {
     pub junction_deviation: Millimetres,
     /// Heights of the drawing pen.
     pub depth: PenDepth,
-    /// Speed of the pen's servo, in degrees a second.
+    /// Speed of the pen's servo, in degrees a second; never above that of all servos.
     pub pen_speed: u16,
 }
 
@@ -70,39 +73,6 @@ impl Default for PlanData {
 /// The plan has no room: [`PLAN_SEGMENTS`] wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Full;
-
-/// What happened while time went on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PlanEvent {
-    /// Everything is done, the pen is up, and no more came in time.
-    Over,
-    /// The arm stands at the edge of the table, over which the plan would lead.
-    Limit(Side),
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Running {
-    block: Block,
-    profile: Profile,
-    begun: Moment,
-    /// Square of the speed at its end.
-    exit: u64,
-    /// Height at rest, and how much of it goes with the speed, in 2^16 / (1/2^32 units a microsecond).
-    contact: i32,
-    pressure: i32,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Stage {
-    /// The arm is somebody else's.
-    Idle,
-    /// The pen goes up or down.
-    Pen(Moment),
-    Moving(Running),
-    Dwelling(Moment),
-    /// The queue is empty; the host may go on.
-    Lingering(Moment),
-}
 
 /// The plan, and its motion while it has the arm.
 #[derive(Debug)]
@@ -138,7 +108,7 @@ impl Planner {
             },
             queue: Deque::new(),
             stage: Stage::Idle,
-            pen: Pen::new(lift, data.pen_speed),
+            pen: Pen::new(lift, data.pen_speed.min(degrees_per_second)),
             place: (HOME.x, HOME.y),
             end: (HOME.x, HOME.y),
             clock: Moment::default(),
@@ -235,48 +205,6 @@ impl Planner {
         Ok(())
     }
 
-    /// Settles the speeds at all junctions.
-    fn look_ahead(&mut self, told: Moment) {
-        let mut exit = 0;
-        for block in self.queue.iter_mut().rev() {
-            block.entry = block.most_entry.min(exit + block.energy);
-            exit = block.entry;
-        }
-        let mut reach = 0;
-        let mut now = None;
-        if let Stage::Moving(running) = &self.stage {
-            let (done, speed) = running.profile.at(told.since(running.begun));
-            let left = running.block.length.saturating_sub(done);
-            let square = u64::from(speed) * u64::from(speed);
-            reach = square + self.limits.acceleration.energy(left);
-            now = Some((done, speed));
-        }
-        let mut first = None;
-        for block in &mut self.queue {
-            block.entry = block.entry.min(reach);
-            reach = block.entry + block.energy;
-            first.get_or_insert(block.entry);
-        }
-        let (Stage::Moving(running), Some((done, speed)), Some(exit)) =
-            (&mut self.stage, now, first)
-        else {
-            return;
-        };
-        // More segments never mean less speed, but for rounding.
-        if exit > running.exit {
-            let task = Task {
-                done,
-                length: running.block.length,
-                entry: speed,
-                nominal: running.block.nominal,
-                exit: exit.isqrt() as u32,
-            };
-            running.profile = Profile::new(task, self.limits.acceleration);
-            running.begun = running.begun.max(told);
-            running.exit = exit;
-        }
-    }
-
     /// The plan has the arm, which stands at `position`, from now on.
     ///
     /// A stroke begins where the host knows the arm, wherever somebody else has left it meanwhile; a
@@ -308,15 +236,6 @@ impl Planner {
         self.stage = Stage::Lingering(self.clock);
     }
 
-    /// The first blocks are new: the speeds at their junctions are too.
-    fn link_the_first(&mut self) {
-        let mut prior: Option<Block> = None;
-        for block in self.queue.iter_mut().take(APPROACH + 2) {
-            block.most_entry = prior.map_or(0, |prior| block.junction_with(&prior, &self.limits));
-            prior = Some(*block);
-        }
-    }
-
     /// Everything planned is forgotten. The arm stays at `position`, and the pen rises.
     pub(crate) fn halt(&mut self, position: Position, now: Micros) {
         self.forget(position);
@@ -338,178 +257,4 @@ impl Planner {
         self.leads_off = false;
         self.changed = true;
     }
-
-    /// Lets everything happen that happens until `now`, or until something has to be told.
-    pub(crate) fn advance(&mut self, now: Micros) -> Option<PlanEvent> {
-        let now = Moment::from(now);
-        // Each turn ends a stage; a block has at most three.
-        while let Some(ends) = self.stage_ends().filter(|ends| *ends <= now) {
-            self.clock = ends;
-            match self.stage {
-                Stage::Idle => return None,
-                Stage::Pen(_) => {
-                    self.pen.arrive(ends);
-                    if self.queue.is_empty() {
-                        return Some(self.over());
-                    }
-                }
-                Stage::Moving(running) => {
-                    let speed = running.profile.at(running.profile.duration()).1;
-                    self.pen.follow(running.height(speed), ends);
-                    self.place = running.block.to;
-                    if let Some(side) = running.block.leaves {
-                        return Some(PlanEvent::Limit(side));
-                    }
-                    if running.block.dwell > Micros::default() {
-                        self.stage = Stage::Dwelling(ends.after(fine(running.block.dwell)));
-                        continue;
-                    }
-                }
-                Stage::Dwelling(_) => {}
-                Stage::Lingering(_) => {
-                    if self.queue.is_empty() {
-                        if self.pen.is_up() {
-                            return Some(self.over());
-                        }
-                        self.stage = self.send_pen(PEN_UP, ends);
-                        continue;
-                    }
-                }
-            }
-            if let Some(side) = self.next(ends) {
-                return Some(PlanEvent::Limit(side));
-            }
-        }
-        None
-    }
-
-    fn over(&mut self) -> PlanEvent {
-        self.stage = Stage::Idle;
-        self.changed = true;
-        PlanEvent::Over
-    }
-
-    /// Where the arm stands; when the stage under way began.
-    pub(crate) fn rests_at(&self) -> (Position, Micros) {
-        let (x, y) = self.place;
-        let z = self.pen.height();
-        (Position { x, y, z }, self.clock.micros())
-    }
-
-    /// The set-point at `now`, which lies in the stage under way.
-    #[inline]
-    pub(crate) fn at(&mut self, now: Micros) -> Position {
-        let now = Moment::from(now);
-        let Stage::Moving(running) = &self.stage else {
-            self.pen.wait(now);
-            return self.rests_at().0;
-        };
-        let (distance, speed) = running.profile.at(now.since(running.begun));
-        self.pen.follow(running.height(speed), now);
-        let Block { from, to, unit, .. } = &running.block;
-        let [along_x, along_y] = unit;
-        Position {
-            x: on_the_way(from.0, to.0, *along_x, distance),
-            y: on_the_way(from.1, to.1, *along_y, distance),
-            z: self.pen.height(),
-        }
-    }
-
-    const fn stage_ends(&self) -> Option<Moment> {
-        match &self.stage {
-            Stage::Idle => None,
-            Stage::Pen(ends) | Stage::Dwelling(ends) | Stage::Lingering(ends) => Some(*ends),
-            Stage::Moving(running) => Some(running.begun.after(running.profile.duration())),
-        }
-    }
-
-    /// Sends the pen somewhere.
-    fn send_pen(&mut self, to: Coordinate, now: Moment) -> Stage {
-        Stage::Pen(now.after(fine(self.pen.send(to, now))))
-    }
-
-    /// Begins what is next; a side of the table when that is in the way at once.
-    fn next(&mut self, now: Moment) -> Option<Side> {
-        while let Some(block) = self.queue.front() {
-            let leaves = block.leaves;
-            if block.is_nothing() {
-                self.queue.pop_front();
-                self.changed = true;
-                match leaves {
-                    None => continue,
-                    side => return side,
-                }
-            }
-            let (ready, height) = if block.intensity.is_off() {
-                (self.pen.is_up(), PEN_UP)
-            } else {
-                (self.pen.is_down(), self.depth.contact)
-            };
-            if !ready {
-                self.stage = self.send_pen(height, now);
-                return None;
-            }
-            let Some(block) = self.queue.pop_front() else {
-                break;
-            };
-            self.changed = true;
-            self.stage = Stage::Moving(self.run(block, now));
-            return None;
-        }
-        self.changed = true;
-        self.stage = Stage::Lingering(now.after(fine(STREAM_GAP)));
-        None
-    }
-
-    fn run(&self, block: Block, now: Moment) -> Running {
-        let exit = self.queue.front().map_or(0, |next| next.entry);
-        let task = Task {
-            done: 0,
-            length: block.length,
-            entry: block.entry.isqrt() as u32,
-            nominal: block.nominal,
-            exit: exit.isqrt() as u32,
-        };
-        let (contact, pressure) = if block.intensity.is_off() {
-            (PEN_UP, 0)
-        } else {
-            let below = i64::from(self.depth.below_contact(block.intensity));
-            let pressure = (below << 16) / i64::from(block.nominal.max(1));
-            let pressure = i32::try_from(pressure).unwrap_or(i32::MAX);
-            (self.depth.contact, pressure)
-        };
-        Running {
-            profile: Profile::new(task, self.limits.acceleration),
-            block,
-            begun: now,
-            exit,
-            contact: contact.bits(),
-            pressure,
-        }
-    }
 }
-
-impl Running {
-    /// Of the pen at a speed.
-    #[inline]
-    fn height(&self, speed: u32) -> i32 {
-        self.contact - ((i64::from(self.pressure) * i64::from(speed)) >> 16) as i32
-    }
-}
-
-/// A coordinate after some distance; never beyond either end.
-#[inline]
-fn on_the_way(from: Coordinate, to: Coordinate, unit: i32, distance: u32) -> Coordinate {
-    const HALF: i64 = 1 << 29;
-    let along = ((i64::from(unit) * i64::from(distance) + HALF) >> 30) as i32;
-    let whole = to.bits() - from.bits();
-    let along = if whole < 0 {
-        along.max(whole)
-    } else {
-        along.min(whole)
-    };
-    Coordinate::from_bits(from.bits() + along)
-}
-
-#[cfg(test)]
-mod tests;

@@ -126,3 +126,45 @@ impl Pen {
 const MOST_RATE: u32 = 4096;
 /// What counts of the time between two frames, in microseconds; its product with the rate fits 31 bits.
 const MOST_PASSED: u32 = 1 << 18;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::HOME_ANGLES;
+
+    fn at(micros: u64) -> Moment {
+        Moment::from(Micros::new(micros))
+    }
+
+    #[test]
+    fn intensities_lie_evenly_between_contact_and_full() {
+        let depth = PenDepth::default();
+        for (intensity, below) in [(1, 0.0), (128, 200.0), (255, 400.0), (64, 99.2126)] {
+            let found = f64::from(depth.below_contact(Intensity(intensity))) / 65536.0;
+            assert!((found - below).abs() < 0.001, "S{intensity}: {found}");
+        }
+    }
+
+    #[test]
+    fn the_pen_is_as_fast_as_its_servo() {
+        let mut pen = Pen::new(PenLift::default(), 600);
+        // 27 degrees at 600 degrees a second.
+        let contact = PenDepth::default().contact;
+        let takes = pen.send(contact, at(0)).get();
+        assert!((45_000..45_060).contains(&takes), "{takes} us");
+        pen.wait(at(takes / 2));
+        let half = pen.height().to_f64();
+        assert!((half - 700.0).abs() < 0.1, "{half}");
+        assert!(!pen.is_down() && !pen.is_up());
+        pen.wait(at(takes));
+        assert_eq!(pen.height(), contact);
+    }
+
+    #[test]
+    fn a_long_frame_is_no_overflow() {
+        let mut pen = Pen::new(PenLift::new(HOME_ANGLES.pen), u16::MAX);
+        pen.send(PenDepth::default().full, at(0));
+        pen.wait(at(u64::MAX >> 9));
+        assert_eq!(pen.height(), PenDepth::default().full);
+    }
+}
