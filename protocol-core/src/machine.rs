@@ -108,6 +108,7 @@ impl Machine {
                 pulses: Pulses::default(),
                 held: false,
                 moving: false,
+                outputs: [false; 3],
             },
         };
         machine.last.pulses = machine.pulses(HOME);
@@ -222,6 +223,7 @@ impl Machine {
             held: held || self.passed_short,
             // A move that ended between two frames shows by the pulses alone.
             moving: was_moving || self.is_moving() || pulses != self.last.pulses,
+            outputs: self.plan.outputs(),
         };
         self.passed_short = false;
         self.last

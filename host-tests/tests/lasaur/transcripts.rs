@@ -2,9 +2,9 @@
 
 use host_tests::lasaur::host::{LasaurApp, LaserWeb};
 use host_tests::lasaur::rig::Rig;
-use protocol_core::lasaur::{Assist, BANNER, Step, VERSION};
+use protocol_core::lasaur::{BANNER, Step, VERSION};
 use protocol_core::machine::StopReason;
-use protocol_core::motion::{Feed, Intensity, Millimetres, Segment, TablePoint};
+use protocol_core::motion::{Assist, Feed, Intensity, Millimetres, Segment, TablePoint};
 
 /// Pieces as they may be cut on the way, bytes at a time.
 const CUTS: [usize; 6] = [1, 2, 3, 7, 16, 300];

@@ -54,17 +54,6 @@ pub enum Offset {
     Custom,
 }
 
-/// The switched outputs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Assist {
-    /// M80 on, M81 off.
-    Air,
-    /// M82 on, M83 off.
-    Aux1,
-    /// M84 on, M85 off.
-    Aux2,
-}
-
 /// What a line does, beside setting what is modal; of several, the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Action {
@@ -94,7 +83,7 @@ pub struct Command {
     pub offset: Option<Offset>,
     /// The last of G0, G1, G4, G10, G30.
     pub action: Action,
-    /// M80 to M85, in the order of [`Assist`].
+    /// M80 to M85, in the order of [`crate::motion::Assist`].
     pub outputs: [Option<bool>; 3],
     /// As written.
     pub x: Option<Millimetres>,

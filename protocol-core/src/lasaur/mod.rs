@@ -30,7 +30,7 @@ mod units;
 mod words;
 
 pub use checksum::{checksum, is_right};
-pub use command::{Assist, Fault};
+pub use command::Fault;
 pub use modal::{DEFAULT_OFFSET, MAX_STEPS, Step, Steps};
 pub use receive::{CHUNK, Effect, MAX_LINE, READY, RECEIVE_BUFFER};
 pub use reply::{BANNER, MAX_REPLY, Reply, Sensors, VERSION};

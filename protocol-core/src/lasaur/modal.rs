@@ -5,9 +5,9 @@
 //! from where its plan ends at that moment, offsets included, whoever moved it and however a stop ended
 //! that. So nothing a line does, or does not, can shift them.
 
-use super::command::{Action, Assist, Command, Distance, Fault, Offset, Travel};
+use super::command::{Action, Command, Distance, Fault, Offset, Travel};
 use super::units::{Unit, place, sum};
-use crate::motion::{Feed, Intensity, Micros, Millimetres, Segment, TablePoint};
+use crate::motion::{Assist, Feed, Intensity, Micros, Millimetres, Segment, TablePoint};
 use heapless::Vec;
 
 /// Both offsets of a new session.
@@ -88,8 +88,7 @@ impl Modal {
             }
         }
         let mut steps = Steps::new();
-        let outputs = [Assist::Air, Assist::Aux1, Assist::Aux2];
-        for (output, on) in outputs.into_iter().zip(command.outputs) {
+        for (output, on) in Assist::ALL.into_iter().zip(command.outputs) {
             if let Some(on) = on {
                 push(&mut steps, Step::Output(output, on));
             }

@@ -1,7 +1,7 @@
 //! What a board says about its arm, and what the arm tells the board.
 
 use crate::arm::{Angles, PenLift, Pulses, ServoRange, forward};
-use crate::motion::{Microdegrees, Micros, PlanData, Position};
+use crate::motion::{Microdegrees, Micros, Outputs, PlanData, Position};
 
 /// What a board says about its arm.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +42,8 @@ pub struct SetPoint {
     pub held: bool,
     /// A move is under way, or this is where it ended.
     pub moving: bool,
+    /// Whether air, aux1 and aux2 are on (M80 to M85).
+    pub outputs: Outputs,
 }
 
 /// Where the nib of an arm without offsets is when its servos are given `pulses`: forward kinematics,

@@ -2,7 +2,9 @@
 
 use super::{Errand, Machine, PlanEvent, Report, Turn};
 use crate::machine::Client;
-use crate::motion::{Feed, Intensity, Micros, Position, Segment, Side, TablePoint};
+use crate::motion::{
+    Assist, Feed, Intensity, Micros, Outputs, Position, Segment, Side, TablePoint,
+};
 
 /// Why the machine is stopped (`spec LasaurGrbl, Return Format`; `reference/lasaurgrbl.md`, section 4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +68,24 @@ impl Machine {
             feed: Feed::DEFAULT,
             intensity: Intensity::OFF,
         })
+    }
+
+    /// Switches an output (M80 to M85) when everything planned so far has been done; at once where that
+    /// is so. A stop forgets what has not been switched, and leaves what has.
+    ///
+    /// # Errors
+    /// [`NotPlanned::Stopped`]; then nothing has changed.
+    pub fn switch(&mut self, assist: Assist, on: bool) -> Result<(), NotPlanned> {
+        if self.stopped.is_some() {
+            return Err(NotPlanned::Stopped);
+        }
+        self.plan.switch(assist, on);
+        Ok(())
+    }
+
+    /// Whether air, aux1 and aux2 are on.
+    pub const fn outputs(&self) -> Outputs {
+        self.plan.outputs()
     }
 
     /// How many more segments fit into the plan.

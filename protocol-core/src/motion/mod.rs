@@ -10,8 +10,8 @@ mod units;
 
 pub use area::{MAX_RADIUS, closest, contains, line_leaves};
 pub use planner::{
-    Acceleration, Feed, Intensity, LEAST_FEED, MOST_DWELL, MOST_FEED, PLAN_SEGMENTS, PenDepth,
-    PlanData, STREAM_GAP, Segment,
+    Acceleration, Assist, Feed, Intensity, LEAST_FEED, MOST_DWELL, MOST_FEED, Outputs,
+    PLAN_SEGMENTS, PenDepth, PlanData, STREAM_GAP, Segment,
 };
 pub use stepping::{DEFAULT_STEPS, STEP_TIME, StepRange, StepSize, Steps};
 pub use table::{Direction, Millimetres, Side, Table, TablePoint, UNITS_PER_MILLIMETRE};

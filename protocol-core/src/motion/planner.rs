@@ -11,6 +11,7 @@
 //! until it is up, no longer than its servo takes. While it draws, it is the deeper the nearer the
 //! speed is to the nominal one, and as deep as light contact at least.
 
+mod assist;
 mod block;
 mod feed;
 mod look_ahead;
@@ -19,6 +20,7 @@ mod pen;
 mod profile;
 mod stages;
 
+pub use assist::{Assist, Outputs};
 pub use block::{MOST_DWELL, Segment};
 pub use feed::{Acceleration, Feed, LEAST_FEED, MOST_FEED};
 pub use pen::{Intensity, PenDepth};
@@ -27,6 +29,7 @@ pub(crate) use stages::PlanEvent;
 use super::table::{Millimetres, Table, UNITS_PER_MILLIMETRE};
 use super::units::{HOME, Micros, PEN_UP, Position};
 use crate::arm::PenLift;
+use assist::Switches;
 use block::{Block, Limits, Place};
 use heapless::Deque;
 use moment::Moment;
@@ -91,6 +94,9 @@ pub(crate) struct Planner {
     clock: Moment,
     /// The last segment leads over the table's edge: what follows will never be.
     leads_off: bool,
+    outputs: Outputs,
+    /// What is switched when the segment under way, and its dwell, have been done.
+    then: Switches,
     changed: bool,
 }
 
@@ -113,7 +119,26 @@ impl Planner {
             end: (HOME.x, HOME.y),
             clock: Moment::default(),
             leads_off: false,
+            outputs: Outputs::default(),
+            then: Switches::default(),
             changed: false,
+        }
+    }
+
+    /// Whether air, aux1 and aux2 are on.
+    pub(crate) const fn outputs(&self) -> Outputs {
+        self.outputs
+    }
+
+    /// Switches an output when everything planned so far has been done.
+    pub(crate) fn switch(&mut self, assist: Assist, on: bool) {
+        match (self.queue.back_mut(), &self.stage) {
+            (Some(last), _) => last.then.set(assist, on),
+            (None, Stage::Moving(_) | Stage::Dwelling(_)) => self.then.set(assist, on),
+            (None, Stage::Idle | Stage::Pen(_) | Stage::Lingering(_)) => {
+                self.then.set(assist, on);
+                self.then.switch(&mut self.outputs);
+            }
         }
     }
 
@@ -255,6 +280,7 @@ impl Planner {
         self.place = (position.x, position.y);
         self.end = self.place;
         self.leads_off = false;
+        self.then = Switches::default();
         self.changed = true;
     }
 }

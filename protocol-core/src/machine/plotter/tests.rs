@@ -1,8 +1,11 @@
 //! The plan beside the errands: who moves when, and what becomes of a stop.
 
+extern crate std;
 use super::*;
 use crate::machine::{ArmData, Calibration, Manner, SetPoint, Target};
 use crate::motion::{Coordinate, HOME, Millimetres, PEN_UP, PLAN_SEGMENTS, STREAM_GAP};
+use std::vec;
+use std::vec::Vec;
 
 const A: Client = Client(0);
 const B: Client = Client(1);
@@ -436,4 +439,109 @@ fn a_host_that_leaves_has_its_plan_done() {
     arm.machine.client_gone(Client::SERIAL);
     let last = arm.rest();
     assert_eq!((arm.at(), last.position.z), ((40.0, 80.0), PEN_UP));
+}
+
+#[test]
+fn outputs_are_switched_at_their_place_in_the_plan() {
+    let mut arm = Arm::new();
+    arm.seek(10, 10);
+    assert_eq!(arm.machine.switch(Assist::Air, true), Ok(()));
+    arm.seek(30, 10);
+    assert_eq!(arm.machine.switch(Assist::Aux2, true), Ok(()));
+    assert_eq!(arm.machine.switch(Assist::Air, false), Ok(()));
+    let mut seen = vec![(arm.tick().outputs, arm.at())];
+    while arm.machine.is_busy() {
+        let outputs = arm.tick().outputs;
+        if seen.last().is_some_and(|(last, _)| *last != outputs) {
+            seen.push((outputs, arm.at()));
+        }
+    }
+    let (outputs, places): (Vec<_>, Vec<_>) = seen.into_iter().unzip();
+    assert_eq!(
+        outputs,
+        [[false; 3], [true, false, false], [false, false, true]]
+    );
+    // Within a frame of where the segments end, at 50 mm/s at most.
+    assert!((places[1].0 - 10.0).abs() < 0.6, "{places:?}");
+    assert!((places[2].0 - 30.0).abs() < 0.6, "{places:?}");
+}
+
+#[test]
+fn outputs_do_not_slow_a_stroke() {
+    let time = |switching: bool| {
+        let mut arm = Arm::new();
+        arm.feed(0, 10);
+        arm.rest();
+        let begun = arm.now;
+        for x in [10, 20, 30, 40] {
+            arm.feed(x, 10);
+            if switching {
+                assert_eq!(arm.machine.switch(Assist::Aux1, x % 20 == 0), Ok(()));
+            }
+        }
+        arm.rest();
+        arm.now - begun
+    };
+    assert_eq!(time(true), time(false));
+}
+
+#[test]
+fn outputs_of_an_arm_at_rest_are_switched_at_once() {
+    let mut arm = Arm::new();
+    for assist in Assist::ALL {
+        assert_eq!(arm.machine.switch(assist, true), Ok(()));
+    }
+    assert_eq!(arm.machine.outputs(), [true; 3]);
+    assert_eq!(arm.machine.switch(Assist::Aux1, false), Ok(()));
+    assert_eq!(arm.tick().outputs, [true, false, true]);
+    // With a dwell before it, after that.
+    assert_eq!(
+        arm.machine.dwell(Micros::new(200 * MS), Intensity::OFF),
+        Ok(())
+    );
+    assert_eq!(arm.machine.switch(Assist::Aux1, true), Ok(()));
+    assert_eq!(arm.run(100).outputs, [true, false, true]);
+    assert_eq!(arm.rest().outputs, [true; 3]);
+}
+
+#[test]
+fn a_stop_keeps_what_is_switched_and_forgets_what_is_not() {
+    let mut arm = Arm::new();
+    assert_eq!(arm.machine.switch(Assist::Air, true), Ok(()));
+    arm.seek(10, 10);
+    assert_eq!(arm.machine.switch(Assist::Air, false), Ok(()));
+    arm.seek(30, 10);
+    assert_eq!(arm.machine.switch(Assist::Aux1, true), Ok(()));
+    arm.run(50);
+    arm.machine.stop(StopReason::Requested);
+    assert_eq!(
+        arm.machine.switch(Assist::Aux2, true),
+        Err(NotPlanned::Stopped)
+    );
+    arm.rest();
+    arm.machine.resume();
+    arm.seek(5, 5);
+    assert_eq!(arm.rest().outputs, [true, false, false]);
+}
+
+#[test]
+fn the_planned_position_is_where_the_host_knows_the_arm() {
+    let mut arm = Arm::new();
+    let planned = |arm: &Arm| {
+        let TablePoint { x, y } = arm.machine.planned_position();
+        (x.to_f64(), y.to_f64())
+    };
+    // The arm's own home lies off the table.
+    assert_eq!(planned(&arm), (14.5, 90.0));
+    arm.seek(10, 20);
+    arm.seek(30, 40);
+    assert_eq!(planned(&arm), (30.0, 40.0));
+    arm.run(50);
+    arm.machine.stop(StopReason::Requested);
+    assert_eq!(planned(&arm).0, arm.at().0);
+    arm.machine.resume();
+    // Over the edge: where the arm will stand.
+    arm.seek(10, 20);
+    arm.seek(-10, 20);
+    assert_eq!(planned(&arm), (0.0, 20.0));
 }

@@ -2,6 +2,7 @@
 
 use super::super::table::{Side, TablePoint};
 use super::super::units::{Coordinate, Micros};
+use super::assist::Switches;
 use super::feed::{Acceleration, Feed, servo_limit};
 use super::pen::Intensity;
 
@@ -43,6 +44,8 @@ pub(super) struct Block {
     pub(super) dwell: Micros,
     /// It ends where its way leaves the table.
     pub(super) leaves: Option<Side>,
+    /// What is switched when it has been done.
+    pub(super) then: Switches,
 }
 
 /// What limits the speed of all blocks.
@@ -85,6 +88,7 @@ impl Block {
             intensity,
             dwell: Micros::default(),
             leaves: None,
+            then: Switches::default(),
         }
     }
 
@@ -102,6 +106,7 @@ impl Block {
             intensity,
             dwell: dwell.min(MOST_DWELL),
             leaves: None,
+            then: Switches::default(),
         }
     }
 
@@ -110,6 +115,7 @@ impl Block {
         Self {
             dwell: self.dwell,
             leaves: self.leaves,
+            then: self.then,
             ..Self::segment(from, self.to, self.feed, self.intensity, limits)
         }
     }

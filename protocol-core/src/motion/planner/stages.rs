@@ -66,8 +66,9 @@ impl Planner {
                         self.stage = Stage::Dwelling(ends.after(fine(running.block.dwell)));
                         continue;
                     }
+                    self.then.switch(&mut self.outputs);
                 }
-                Stage::Dwelling(_) => {}
+                Stage::Dwelling(_) => self.then.switch(&mut self.outputs),
                 Stage::Lingering(_) => {
                     if self.queue.is_empty() {
                         if self.pen.is_up() {
@@ -135,6 +136,8 @@ impl Planner {
         while let Some(block) = self.queue.front() {
             let leaves = block.leaves;
             if block.is_nothing() {
+                let mut then = block.then;
+                then.switch(&mut self.outputs);
                 self.queue.pop_front();
                 self.changed = true;
                 match leaves {
@@ -155,6 +158,7 @@ impl Planner {
                 break;
             };
             self.changed = true;
+            self.then = block.then;
             self.stage = Stage::Moving(self.run(block, now));
             return None;
         }
