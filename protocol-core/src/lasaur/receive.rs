@@ -93,9 +93,7 @@ impl Receiver {
             _ => {}
         }
         if self.waiting.push_back(byte).is_err() {
-            self.torn = true;
-            self.stop();
-            return Some(Effect::Stop(StopReason::ReceiveOverflow));
+            return Some(self.lose_byte());
         }
         if byte == b'\n' {
             self.complete = self.waiting.len();
@@ -105,6 +103,13 @@ impl Receiver {
             self.torn = false;
         }
         self.assemble()
+    }
+
+    /// A byte is lost: the line that is arriving is void.
+    pub fn lose_byte(&mut self) -> Effect {
+        self.torn = true;
+        self.stop();
+        Effect::Stop(StopReason::ReceiveOverflow)
     }
 
     /// Stop mode has begun: lines that are complete are void.

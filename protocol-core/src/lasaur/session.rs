@@ -114,6 +114,19 @@ impl Session {
         }
     }
 
+    /// A byte has been lost before it got here: what [`super::RECEIVE_BUFFER`] bytes too many do as well.
+    #[must_use]
+    pub fn lose_byte(&mut self) -> Effect {
+        let effect = self.receiver.lose_byte();
+        self.note(effect);
+        effect
+    }
+
+    /// Whether nothing waits to be executed or answered.
+    pub fn is_idle(&self) -> bool {
+        self.begun.is_none() && self.receiver.line().is_none()
+    }
+
     /// Begins the complete line, and gives what it asks for. It ends with [`Self::reply`].
     pub fn begin_line(&mut self, facts: &Facts) -> Line {
         self.look(facts);

@@ -4,8 +4,10 @@
 pub mod canvas;
 pub mod clock;
 pub mod draw;
+pub mod draw_lasaur;
 pub mod flash;
 pub mod net;
+pub mod pty;
 pub mod recorder;
 
 use crate::board::{Address, Vitals};

@@ -378,6 +378,17 @@ fn one_byte_more_than_the_receive_buffer_holds() {
 }
 
 #[test]
+fn a_byte_that_is_lost_before_it_gets_here() {
+    let mut rig = Rig::default();
+    rig.receive(b"G0X1");
+    let effect = rig.session.lose_byte();
+    rig.effect(effect);
+    // `2` was lost: G0X13 is not where it should go.
+    assert_eq!(rig.say(b"~3\nG90\n"), "!B\\n\\n");
+    assert_eq!(rig.done, []);
+}
+
+#[test]
 fn one_character_more_than_a_line_holds() {
     let longest = [&b"?"[..], &[b'x'; MAX_LINE - 1]].concat();
     let blanks = [&longest[..], &[b' '; 300], b"\n"].concat();
