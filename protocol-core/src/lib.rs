@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 pub mod arm;
+pub mod lasaur;
 pub mod lineus;
 pub mod machine;
 pub mod motion;

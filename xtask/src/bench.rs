@@ -89,6 +89,18 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
             peers: vec![("f32 with libm", of("set-point, f32 with libm")?)],
         },
         Row {
+            work: "set-point of a plan",
+            goal: Goal::Instructions(450),
+            measured: of("set-point of a plan")?,
+            peers: vec![],
+        },
+        Row {
+            work: "plan a segment",
+            goal: Goal::Instructions(20_000),
+            measured: of("plan a segment")?,
+            peers: vec![],
+        },
+        Row {
             work: "G01 over TCP",
             goal: Goal::Times(1.25),
             measured: round_trip(&firmware)?,

@@ -91,19 +91,22 @@ fn fuzz() -> Result<()> {
         println!("skipped: cargo install cargo-fuzz --locked");
         return Ok(());
     }
-    let mut fuzz = Command::new("cargo");
-    for variable in ["CARGO", "RUSTUP_TOOLCHAIN"] {
-        fuzz.env_remove(variable);
+    for target in ["session", "lasaur"] {
+        let mut fuzz = Command::new("cargo");
+        for variable in ["CARGO", "RUSTUP_TOOLCHAIN"] {
+            fuzz.env_remove(variable);
+        }
+        fuzz.current_dir(root().join("host-tests")).args([
+            "+nightly",
+            "fuzz",
+            "run",
+            target,
+            "--",
+            "-max_total_time=20",
+        ]);
+        run(&mut fuzz)?;
     }
-    fuzz.current_dir(root().join("host-tests")).args([
-        "+nightly",
-        "fuzz",
-        "run",
-        "session",
-        "--",
-        "-max_total_time=20",
-    ]);
-    run(&mut fuzz)
+    Ok(())
 }
 
 fn step(name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {

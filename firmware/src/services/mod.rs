@@ -5,6 +5,7 @@ pub mod dhcp;
 pub mod line_us;
 pub mod network;
 pub mod panel;
+pub mod serial;
 pub mod storage;
 
 use crate::board::Vitals;

@@ -88,6 +88,15 @@ impl PenLift {
         Microdegrees::new(self.down.get() + high_half(z.bits() << 4, self.slope))
     }
 
+    /// How fast Z changes when the servo turns at so many degrees a second, in 1/65536 units a
+    /// microsecond.
+    pub(crate) fn rate(self, degrees_per_second: u16) -> u32 {
+        // Degrees a second are microdegrees a microsecond.
+        let turned = u64::from(degrees_per_second) << (12 + Coordinate::FRACTION_BITS);
+        let rate = turned / u64::from(self.slope.unsigned_abs().max(1));
+        rate.min(u32::MAX.into()) as u32
+    }
+
     fn height(self, pen: Microdegrees) -> Coordinate {
         if self.slope == 0 {
             return PEN_UP;

@@ -128,6 +128,7 @@ impl Reply {
     pub fn report(&mut self, report: &Report) {
         match report {
             Report::Resting => self.ok(),
+            Report::Stopped => self.error(format_args!("{STOPPED}")),
             Report::Moving { end, limited } => self.place(*end, limited.map(tell)),
         }
     }
@@ -312,6 +313,9 @@ impl Reply {
         }
     }
 }
+
+/// Why there is no move.
+const STOPPED: &str = "the machine is stopped: send ~ on the serial line or press the button";
 
 fn tell(limited: Limited) -> &'static str {
     match limited {

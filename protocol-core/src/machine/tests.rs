@@ -2,7 +2,7 @@
 
 extern crate std;
 use super::*;
-use crate::motion::contains;
+use crate::motion::{WideCoordinate, contains};
 
 const A: Client = Client(0);
 const B: Client = Client(1);

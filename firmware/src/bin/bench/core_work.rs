@@ -6,7 +6,9 @@ use core::hint::black_box;
 use protocol_core::arm::{Angles, PenLift, inverse};
 use protocol_core::lineus::{Command, Refusal, parse};
 use protocol_core::machine::{ArmData, Client, Errand, Machine, Manner, SetPoint, Target};
-use protocol_core::motion::{Coordinate, Micros, Position};
+use protocol_core::motion::{
+    Coordinate, Feed, Intensity, Micros, Millimetres, PLAN_SEGMENTS, Position, Segment, TablePoint,
+};
 
 /// The points of the other measurements, in 1/65536 units.
 const POINTS: [Position; 5] = [
@@ -37,6 +39,70 @@ pub fn report() {
         RefCell::new(machine)
     });
     measure::report("set-point", &moves, set_point);
+    measure::report(
+        "set-point of a plan",
+        &STROKE_MILLIS.map(in_a_stroke),
+        next_set_point,
+    );
+    measure::report("plan a segment", &[full_but_one()], plan_one_more);
+}
+
+/// In the rise, the cruise and the fall of a stroke of 600 ms.
+const STROKE_MILLIS: [u64; 5] = [60, 100, 300, 400, 610];
+
+/// An arm in the middle of a stroke, and the time of its last frame.
+fn in_a_stroke(millis: u64) -> RefCell<(Machine, u64)> {
+    let mut machine = Machine::new(ArmData::default(), Default::default());
+    machine.home().expect("there is room");
+    let mut now = 0;
+    while !machine.plan_is_done() {
+        now += 10_000;
+        machine.tick(Micros::new(now));
+    }
+    machine
+        .plan(&segment(25, 45, Intensity(200)))
+        .expect("there is room");
+    for _ in 0..millis / 10 {
+        now += 10_000;
+        machine.tick(Micros::new(now));
+    }
+    RefCell::new((machine, now))
+}
+
+/// An arm whose plan has room for one segment, in a curve that is limited by look-ahead throughout.
+fn full_but_one() -> RefCell<(Machine, u64)> {
+    let arm = in_a_stroke(300);
+    {
+        let (machine, _) = &mut *arm.borrow_mut();
+        for number in 1..PLAN_SEGMENTS as i16 {
+            machine
+                .plan(&segment(25 + number / 2, 45 + number, Intensity(200)))
+                .expect("there is room");
+        }
+    }
+    arm
+}
+
+fn segment(x: i16, y: i16, intensity: Intensity) -> Segment {
+    Segment {
+        to: TablePoint {
+            x: Millimetres::new(x),
+            y: Millimetres::new(y),
+        },
+        feed: Feed::DEFAULT,
+        intensity,
+    }
+}
+
+fn plan_one_more(arm: &RefCell<(Machine, u64)>) {
+    let (machine, _) = &mut *arm.borrow_mut();
+    black_box(machine.plan(&segment(42, 78, Intensity(200)))).ok();
+}
+
+/// A frame in the middle of a stroke: profile, pen, drawing area, kinematics, calibration, pulses.
+fn next_set_point(arm: &RefCell<(Machine, u64)>) -> SetPoint {
+    let (machine, now) = &mut *arm.borrow_mut();
+    machine.tick(Micros::new(*now + 10_000))
 }
 
 fn parsed(line: &&'static [u8]) {

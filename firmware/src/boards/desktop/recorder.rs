@@ -131,6 +131,8 @@ struct Recording {
     reported: Totals,
     /// A frame at rest that has not been written.
     skipped: Option<(Micros, SetPoint)>,
+    /// What the plotter's outputs are said to be.
+    switched: [bool; 3],
     last_moving: Micros,
     unsaved: bool,
     saved: Instant,
@@ -162,6 +164,7 @@ impl Recording {
             totals: Totals::default(),
             reported: Totals::default(),
             skipped: None,
+            switched: [false; 3],
             last_moving: Micros::default(),
             unsaved: false,
             saved: Instant::now(),
@@ -182,10 +185,21 @@ impl Recording {
                 self.resting(time, set_point)
             };
             self.note(written);
+            self.tell_outputs(set_point.outputs);
             previous = Some(time);
         }
         self.save()?;
         Ok(self.totals)
+    }
+
+    fn tell_outputs(&mut self, outputs: [bool; 3]) {
+        let names = ["air assist", "aux1", "aux2"];
+        for ((name, now), before) in names.iter().zip(outputs).zip(&mut self.switched) {
+            if *before != now {
+                log::info!("{name} is {}", if now { "on" } else { "off" });
+                *before = now;
+            }
+        }
     }
 
     /// The arm draws on without a file; it is tried again when it rests, and told once.
