@@ -159,7 +159,7 @@ impl Planner {
             let (ready, height) = if block.intensity.is_off() {
                 (self.pen.is_up(), PEN_UP)
             } else {
-                (self.pen.is_down(), self.depth.contact)
+                (self.pen.is_down(), self.depth.contact())
             };
             if !ready {
                 self.send_pen(height, now);
@@ -193,7 +193,7 @@ impl Planner {
             let below = i64::from(self.depth.below_contact(block.intensity));
             let pressure = (below << 16) / i64::from(block.nominal.max(1));
             let pressure = i32::try_from(pressure).unwrap_or(i32::MAX);
-            (self.depth.contact, pressure)
+            (self.depth.contact(), pressure)
         };
         Running {
             profile: Profile::new(task, self.limits.acceleration),
