@@ -174,3 +174,7 @@ impl Store {
         self.health.lock(|told| told.set(health));
     }
 }
+
+#[cfg(test)]
+#[cfg(feature = "desktop")]
+mod tests;
