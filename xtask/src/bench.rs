@@ -96,8 +96,14 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
         },
         Row {
             work: "plan a segment",
-            goal: Goal::Instructions(20_000),
+            goal: Goal::Instructions(8_000),
             measured: of("plan a segment")?,
+            peers: vec![],
+        },
+        Row {
+            work: "begin a segment",
+            goal: Goal::Instructions(5_000),
+            measured: of("set-point that begins a segment")?,
             peers: vec![],
         },
         Row {
