@@ -7,7 +7,6 @@ use super::House;
 use crate::board::{Address, Radio};
 use crate::log::{info, warning};
 use core::cell::RefCell;
-use core::cmp::Reverse;
 use core::pin::pin;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_futures::join::join;
@@ -289,7 +288,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                         Either::Second(Input::List) => {
                             let scan = self.radio.scan(&mut self.heard);
                             let _ = select(&mut serving, scan).await;
-                            keep_heard(&mut self.heard, &self.house.wifi);
+                            keep_heard(&self.heard, &self.house.wifi);
                             self.house.wifi.listed.signal(());
                             continue;
                         }
@@ -338,13 +337,12 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
         }
     }
 
-    fn keep_heard(&mut self) {
-        keep_heard(&mut self.heard, &self.house.wifi);
+    fn keep_heard(&self) {
+        keep_heard(&self.heard, &self.house.wifi);
     }
 }
 
-/// Strongest first, and remembered for whoever asks.
-fn keep_heard(heard: &mut Vec<Heard, MAX_HEARD>, wifi: &Wifi) {
-    heard.sort_unstable_by_key(|network| Reverse(network.signal_dbm));
+/// For whoever asks.
+fn keep_heard(heard: &Vec<Heard, MAX_HEARD>, wifi: &Wifi) {
     wifi.heard.lock(|kept| kept.borrow_mut().clone_from(heard));
 }

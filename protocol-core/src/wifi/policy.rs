@@ -11,7 +11,6 @@ use super::{Heard, Joined, MAX_NETWORKS, Network, Networks, SETUP_SSID, Ssid};
 use crate::motion::Micros;
 use crate::panel::{Gesture, Lamp};
 use crate::settings::{AccessPointName, Settings, StartMode};
-use core::cmp::Reverse;
 use core::fmt::Write;
 use heapless::{String, Vec};
 
@@ -443,14 +442,15 @@ fn order(heard: &[Heard], networks: &Networks) -> Vec<Ssid, MAX_NETWORKS> {
         let same = heard.iter().filter(|other| other.ssid == network.ssid);
         same.map(|other| other.signal_dbm).max()
     };
-    // Absent is less than any strength.
-    let mut order: Vec<_, MAX_NETWORKS> = networks
-        .iter()
-        .enumerate()
-        .map(|(place, network)| (Reverse(strength(network)), place, &network.ssid))
-        .collect();
-    order.sort_unstable_by_key(|(strength, place, _)| (*strength, *place));
-    order.iter().map(|(.., ssid)| (*ssid).clone()).collect()
+    // Put in place one by one: eight are not worth the 10 kB of a library's sorting. Absent is less than
+    // any strength, and there are as many places as networks.
+    let mut order = Vec::<_, MAX_NETWORKS>::new();
+    for network in networks.iter() {
+        let strength = strength(network);
+        let place = order.iter().position(|(other, _)| *other < strength);
+        let _ = order.insert(place.unwrap_or(order.len()), (strength, &network.ssid));
+    }
+    order.iter().map(|(_, ssid)| (*ssid).clone()).collect()
 }
 
 #[cfg(test)]
