@@ -33,6 +33,8 @@ pub struct Options {
     pub flash: PathBuf,
     /// What the machine takes for time.
     pub time: Time,
+    /// What is at the other end of its serial line, as QEMU's `-serial` takes it; nothing if `None`.
+    pub serial: Option<String>,
 }
 
 /// What an emulated machine takes for time.
@@ -195,7 +197,7 @@ pub fn free_address() -> Result<SocketAddr> {
 fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
     let [records, console, monitor] = [RECORDS, CONSOLE, MONITOR].map(|name| folder.join(name));
     let mut qemu = machine(firmware, options.time);
-    qemu.args(["-serial", "none"])
+    qemu.args(["-serial", options.serial.as_deref().unwrap_or("none")])
         .arg("-monitor")
         .arg(format!("unix:{},server=on,wait=off", monitor.display()))
         .arg("-chardev")

@@ -12,7 +12,9 @@ use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::boards::virt::flash::Flash;
 use firmware::boards::virt::net::VirtNet;
+use firmware::boards::virt::uart::{Receiver, Transmitter};
 use firmware::boards::virt::world::button::Button;
+use firmware::boards::virt::world::inputs::Inputs;
 use firmware::boards::virt::world::light::Light;
 use firmware::boards::virt::world::servos::Servos;
 use firmware::boards::virt::world::{Lines, Recorder};
@@ -20,6 +22,7 @@ use firmware::boards::virt::{self, Wired, executor};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
+use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
 use firmware::services::{network, panel};
 use protocol_core::lineus::Identity;
@@ -32,6 +35,7 @@ const FRAME: Duration = Duration::from_millis(10);
 const CONNECTIONS: usize = MAX_CLIENTS + 1;
 const BUFFER: usize = 2048;
 
+type SerialPort = (Receiver, Transmitter);
 type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
 
 /// Never returns.
@@ -44,7 +48,8 @@ fn main() -> ! {
         let started = devices.and_then(|devices| {
             spawner.spawn(records(devices.recorder).ok()?);
             spawner.spawn(host_lines(devices.lines).ok()?);
-            spawner.spawn(boot(spawner, tick, devices.card, devices.disk).ok()?);
+            let (card, disk, serial) = (devices.card, devices.disk, devices.serial);
+            spawner.spawn(boot(spawner, tick, card, disk, serial).ok()?);
             Some(())
         });
         if started.is_none() {
@@ -56,7 +61,13 @@ fn main() -> ! {
 
 /// Reads the settings, then starts everything else.
 #[embassy_executor::task]
-async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtNet, disk: Flash) {
+async fn boot(
+    spawner: Spawner,
+    tick: embassy_executor::SendSpawner,
+    card: VirtNet,
+    disk: Flash,
+    port: SerialPort,
+) {
     let Some(memory) = Memory::new(disk, SETTINGS) else {
         log::error!("the settings do not lie in whole pages");
         return;
@@ -84,7 +95,11 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         identity,
         virt::VITALS,
     ));
-    if start(spawner, tick, house, memory, card).is_err() {
+    let started = serial(house, port).map(|task| spawner.spawn(task));
+    if started
+        .and_then(|()| start(spawner, tick, house, memory, card))
+        .is_err()
+    {
         log::error!("a task does not fit");
     }
 }
@@ -141,6 +156,12 @@ async fn servo_tick(house: &'static House) {
         .arm
         .tick(Servos::default(), TimedFrames::every(FRAME), FRAME)
         .await;
+}
+
+#[embassy_executor::task]
+async fn serial(house: &'static House, port: SerialPort) {
+    let (from, to) = port;
+    serve(from, to, ReadError::ByteLost, &mut Inputs, house).await;
 }
 
 #[embassy_executor::task]
