@@ -200,6 +200,11 @@ fn the_radio_does_what_it_does() {
         "the machine opens \"Mine\"",
         "the machine opens \"Line-us-Setup\"",
     );
+    fails_after(
+        setup,
+        "the machine opens \"Line-us-Setup\", password \"correct horse\"",
+        "the machine opens \"Line-us-Setup\"",
+    );
     fails(
         "the machine opens \"Line-us-Setup\"",
         "the machine opens no network",

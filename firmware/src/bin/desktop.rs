@@ -8,12 +8,13 @@ use embassy_time::{Duration, Timer};
 use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::flash::{self, FileFlash};
-use firmware::boards::desktop::net::Listener;
+use firmware::boards::desktop::net::{Listener, Multicast};
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
 use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS, own_network};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::discovery::{self, Ports};
 use firmware::services::line_us::{Server, serve};
 use firmware::services::network;
 use firmware::services::storage::Memory;
@@ -53,6 +54,12 @@ struct Serve {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
+    /// Announce the arm by name, so that clients find it without an address
+    ///
+    /// On the network of the address where clients connect: on this computer alone, unless that is another
+    /// one.
+    #[arg(long)]
+    mdns: bool,
     /// Where the arm keeps its name, calibration and network, made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.state")]
     state: PathBuf,
@@ -124,6 +131,11 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let listener = embassy_futures::block_on(Listener::bind(options.line_us))
         .map_err(|error| named(&options.line_us, error))?;
     let listener: &'static Listener = Box::leak(Box::new(listener));
+    let multicast = options
+        .mdns
+        .then(|| Multicast::beside(options.line_us.ip()))
+        .transpose()
+        .map_err(|error| named(&"--mdns", error))?;
     let flash =
         FileFlash::open(&options.state).map_err(|error| named(&options.state.display(), error))?;
     let data = ArmData {
@@ -146,7 +158,16 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let mut spawned = Ok(());
     clock::run(
         options.speed,
-        |spawner| spawned = serve_clients(spawner, house, memory, servos, frame, listener),
+        |spawner| {
+            spawned =
+                serve_clients(spawner, house, memory, servos, frame, listener).and_then(|()| {
+                    if let Some(multicast) = multicast {
+                        let port = options.line_us.port();
+                        spawner.spawn(discovery(house, multicast, port)?);
+                    }
+                    Ok(())
+                });
+        },
         || STOP.load(Ordering::Relaxed),
     );
     spawned.map_err(io::Error::other)?;
@@ -203,6 +224,12 @@ async fn wifi(house: &'static House) {
     });
     let radio = ScriptedRadio::new(&AIR);
     network::run(house, radio, NoAddress).await;
+}
+
+#[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast, line_us: u16) {
+    let ports = Ports { line_us, web: None };
+    discovery::run(house, &multicast, || Some(multicast.address()), ports).await;
 }
 
 #[embassy_executor::task]

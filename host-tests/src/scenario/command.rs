@@ -70,7 +70,7 @@ pub enum Expectation {
     Light(Pattern),
     LightStays(Pattern, Duration),
     LightWasNever(Hue),
-    Opens(Ssid),
+    Opens(Ssid, Option<Password>),
     ClosesItsNetwork,
     Tries(Ssid, Outcome),
     MayTry(Ssid),

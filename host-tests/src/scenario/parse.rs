@@ -208,7 +208,9 @@ fn expectation(words: &mut Words<'_>) -> Found<Expectation> {
 
 fn machine(words: &mut Words<'_>) -> Result<Expectation, String> {
     Ok(if words.eat("opens") {
-        Expectation::Opens(ssid(words)?)
+        let ssid = ssid(words)?;
+        let password = words.eat("password").then(|| password(words)).transpose()?;
+        Expectation::Opens(ssid, password)
     } else if words.eat("closes its network") {
         Expectation::ClosesItsNetwork
     } else if words.eat("joins") {

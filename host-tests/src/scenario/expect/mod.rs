@@ -38,7 +38,7 @@ pub fn expect(
             if stage.board.air.own().as_ref() == Some(ssid) {
                 // This network has been noticed.
                 let mut opened = stage.board.radio.opened.borrow_mut();
-                if opened.front() == Some(ssid) {
+                if opened.front().is_some_and(|own| own.ssid == *ssid) {
                     opened.pop_front();
                 }
             }
@@ -73,7 +73,7 @@ pub fn expect(
             off.then_some(()).ok_or("power is on".into())
         }
         Expectation::Remembers(what) => remembers(&stage.board.remembered(), what),
-        Expectation::Opens(_)
+        Expectation::Opens(..)
         | Expectation::ClosesItsNetwork
         | Expectation::Tries(..)
         | Expectation::MayTry(_)
