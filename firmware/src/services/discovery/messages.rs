@@ -12,8 +12,11 @@ use edge_mdns::domain::rdata::{Ptr, Srv};
 use edge_mdns::{Buf, NameSlice, set_header};
 use heapless::Vec;
 
-/// Longest message that the machine sends, and takes: what fits a frame of Ethernet (RFC 6762, section 17).
+/// Longest message that the machine takes: what fits a frame of Ethernet (RFC 6762, section 17).
 pub const MAX_MESSAGE: usize = 1472;
+/// Longest message that the machine sends. Everything there is to tell fits; what repeats many questions and
+/// does not is not sent.
+pub const MAX_SENT: usize = 1024;
 /// Questions and records that are looked at in each part of a message; more are not.
 pub const MAX_ENTRIES: usize = 32;
 /// Records of one name that are compared when two machines claim it at once; more are not.

@@ -9,7 +9,7 @@ mod messages;
 mod records;
 mod responder;
 
-pub use messages::{MAX_ENTRIES, MAX_MESSAGE};
+pub use messages::{MAX_ENTRIES, MAX_MESSAGE, MAX_SENT};
 pub use records::{MAX_HOST, Ports};
 
 use super::House;
@@ -117,7 +117,7 @@ async fn serve(
 ) {
     let group = SocketAddr::new(IpAddr::V4(GROUP), PORT);
     let mut received = [0; MAX_MESSAGE];
-    let mut buffer = [0; MAX_MESSAGE];
+    let mut buffer = [0; MAX_SENT];
     loop {
         let place = address().map(|address| Place {
             connection: house.wifi.connection(),

@@ -1,7 +1,7 @@
 //! Machines on a network of the test's own, in virtual time. Messages are written by hand and read with
 //! domain.
 
-use super::super::messages::MAX_MESSAGE;
+use super::super::messages::{MAX_MESSAGE, MAX_SENT};
 use super::*;
 use edge_mdns::domain::base::{Message as Read, ParsedName};
 use edge_mdns::domain::rdata::AllRecordData;
@@ -70,7 +70,7 @@ impl Network {
 
     fn run(&mut self, time: Micros) {
         let end = self.now + time;
-        let mut buffer = [0; MAX_MESSAGE];
+        let mut buffer = [0; MAX_SENT];
         loop {
             while let Some((who, length)) = (0..self.machines.len()).find_map(|who| {
                 let length = self.machines[who].say(self.now, &mut buffer)?;
@@ -93,7 +93,7 @@ impl Network {
     /// Somebody says something to everybody.
     fn hear(&mut self, message: &[u8]) {
         for machine in &mut self.machines {
-            let answer = machine.take(message, false, self.now, &mut [0; MAX_MESSAGE]);
+            let answer = machine.take(message, false, self.now, &mut [0; MAX_SENT]);
             assert_eq!(answer, None, "answers go to everybody");
         }
     }
@@ -359,7 +359,7 @@ fn who_does_not_know_multicast_gets_an_answer_of_its_own() {
     let mut network = Network::settled();
     let mut asked = query(&[("line-us.local", A), ("example.com", A)]);
     asked[..2].copy_from_slice(&[0xab, 0xcd]);
-    let mut buffer = [0; MAX_MESSAGE];
+    let mut buffer = [0; MAX_SENT];
     let now = network.now;
     let length = network.machines[0].take(&asked, true, now, &mut buffer);
     let answer = &buffer[..length.unwrap()];
@@ -651,7 +651,7 @@ proptest! {
     fn any_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..MAX_MESSAGE), one_shot: bool) {
         let mut network = Network::settled();
         let now = network.now;
-        network.machines[0].take(&bytes, one_shot, now, &mut [0; MAX_MESSAGE]);
+        network.machines[0].take(&bytes, one_shot, now, &mut [0; MAX_SENT]);
         network.run(ms(10_000));
     }
 
@@ -663,7 +663,7 @@ proptest! {
         network.add("line-us", 1);
         for (message, one_shot, pause) in messages {
             let now = network.now;
-            network.machines[0].take(&message, one_shot, now, &mut [0; MAX_MESSAGE]);
+            network.machines[0].take(&message, one_shot, now, &mut [0; MAX_SENT]);
             network.run(ms(pause));
         }
         // Whatever was said, it is found in the end.
@@ -672,10 +672,27 @@ proptest! {
         prop_assert!(host == "line-us" || host.starts_with("line-us-"), "{}", host);
         // It says no more than is allowed, all messages can be read, and they fit a frame.
         for (_, _, message) in &network.said {
-            prop_assert!(message.len() <= 1_472);
+            prop_assert!(message.len() <= MAX_SENT);
             words(message);
         }
     }
+}
+
+#[test]
+fn all_there_is_to_tell_fits_a_message() {
+    let mut network = Network::new();
+    network.add(&"a".repeat(32), 1);
+    let mut renamed = network.machines.remove(0);
+    // The longest number, too.
+    renamed.number = MAX_NUMBER;
+    let start = network.now;
+    renamed.begin(start);
+    network.machines.push(renamed);
+    network.run(ms(6_000));
+    assert_eq!(network.hosts(), ["a".repeat(32) + "-9999"]);
+    assert_eq!(network.said.len(), 6);
+    // Claims and tellings, whole.
+    assert_eq!(network.heard().len(), 3 * 8 + 3 * 10);
 }
 
 #[test]
@@ -687,9 +704,9 @@ fn a_message_of_nothing_but_questions_is_looked_at_in_part() {
     network.hear(&asked);
     network.run(ms(100));
     assert_eq!(network.said.len(), 1);
-    // The same name many times is answered once, and alone to who asks alone, if that fits.
+    // The same name many times is answered once; the answer repeats what was looked at.
     let many = query(&[("line-us.local", A); 90]);
-    let mut buffer = [0; MAX_MESSAGE];
+    let mut buffer = [0; MAX_SENT];
     let now = network.now;
     let answer = network.machines[0].take(&many, true, now, &mut buffer);
     assert_eq!(words(&buffer[..answer.unwrap()]).len(), 32 + 2);
