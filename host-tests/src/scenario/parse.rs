@@ -217,6 +217,11 @@ fn machine(words: &mut Words<'_>) -> Result<Expectation, String> {
         Expectation::Tries(ssid(words)?, Outcome::Joined)
     } else if words.eat("does not find") {
         Expectation::Tries(ssid(words)?, Outcome::NotFound)
+    } else if words.eat("is found as") {
+        let host = words.text()?;
+        Expectation::IsFound(Some(String::from_utf8_lossy(&host).into_owned()))
+    } else if words.eat("is not found") {
+        Expectation::IsFound(None)
     } else if words.eat("is refused by") {
         Expectation::Tries(ssid(words)?, Outcome::Refused)
     } else if words.eat("fails to join") {

@@ -3,8 +3,10 @@
 
 use super::journal::note;
 use super::power::Power;
+use core::net::Ipv4Addr;
 use firmware::board::{Address, Radio, RadioFault};
 use firmware::boards::scripted_radio::{Air, ScriptedRadio};
+use firmware::services::dhcp::OWN_ADDRESS;
 use heapless::Vec;
 use protocol_core::wifi::{Heard, Joined, Network, Ssid};
 use std::cell::{Cell, RefCell};
@@ -23,6 +25,17 @@ pub struct RadioRecord {
     pub asked: Cell<bool>,
     /// The machine gives its guests addresses.
     pub serving: Cell<bool>,
+}
+
+impl RadioRecord {
+    /// The machine's address in this air.
+    pub fn address(&self, air: &Air) -> Option<Ipv4Addr> {
+        let given = self.asked.get() && air.joined().is_some();
+        match self.serving.get() {
+            true => Some(OWN_ADDRESS),
+            false => given.then_some(Ipv4Addr::new(10, 0, 0, 2)),
+        }
+    }
 }
 
 /// A network's name as a script writes it.

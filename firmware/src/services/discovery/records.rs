@@ -205,6 +205,19 @@ impl Records {
         more & !asked
     }
 
+    /// What this machine alone says under its name. What kinds of services there are, others say as well.
+    pub fn of_its_name(&self) -> Set {
+        let mut its = Set::NONE;
+        for (number, _) in self.iter() {
+            let service = number.checked_sub(NOTHING_ELSE + 1);
+            let is_kind = service.is_some_and(|it| it % OF_A_SERVICE == OF_A_SERVICE - 1);
+            if !is_kind {
+                its |= Set::of(number);
+            }
+        }
+        its
+    }
+
     /// What is asked for with this name and type; of the host's other types it says that there are none.
     pub fn asked_for(&self, is_name: impl Fn(&NameSlice<'_>) -> bool, rtype: Rtype) -> Set {
         let mut asked = Set::NONE;

@@ -239,7 +239,8 @@ impl Responder {
     /// there is nothing more.
     pub fn say(&mut self, now: Micros, buffer: &mut [u8]) -> Option<usize> {
         if let Some(old) = self.withdrawn.take() {
-            return tell(&old, Set::ALL, Set::NONE, Manner::Withdrawn, buffer);
+            let its = old.of_its_name();
+            return tell(&old, its, Set::NONE, Manner::Withdrawn, buffer);
         }
         let records = self.records.as_ref()?;
         if let Stage::Claiming(made, at) = self.stage {

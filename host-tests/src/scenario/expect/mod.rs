@@ -72,6 +72,13 @@ pub fn expect(
             let off = stage.pass_time(patience, |stage| !stage.board.power.is_on())?;
             off.then_some(()).ok_or("power is on".into())
         }
+        Expectation::IsFound(host) => {
+            let found = stage.pass_time(patience, |stage| stage.board.found_as() == *host)?;
+            let now = || stage.board.found_as().unwrap_or("nothing".into());
+            found
+                .then_some(())
+                .ok_or_else(|| format!("it is found as {}", now()))
+        }
         Expectation::Remembers(what) => remembers(&stage.board.remembered(), what),
         Expectation::Opens(..)
         | Expectation::ClosesItsNetwork

@@ -403,8 +403,10 @@ fn a_renamed_machine_withdraws_its_old_names_at_once() {
     assert_eq!(network.hosts(), ["robs-lineus"]);
     let times = network.times(now);
     assert_eq!(times[0], 0);
+    // Which kinds of services there are, others say as well.
     let withdrawn: Vec<_> = EVERYTHING
         .iter()
+        .filter(|record| !record.starts_with("_services"))
         .map(|record| {
             let record = record.strip_prefix("only ").unwrap_or(record);
             let (record, _) = record.rsplit_once(' ').unwrap();
