@@ -2,13 +2,13 @@
 //! that survives, and servos of which every pulse is read back.
 
 use host_tests::desktop::serial::SerialPort;
-use host_tests::desktop::{Client, draw};
+use host_tests::desktop::{Client, draw, wait_until};
 use host_tests::lasaur::host::LasaurApp;
 use protocol_core::lasaur::BANNER;
 use protocol_core::motion::PEN_UP;
 use std::collections::BTreeSet;
 use std::fs;
-use std::net::{SocketAddr, TcpListener};
+use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
@@ -386,6 +386,42 @@ impl Machine {
         }
         panic!("the light never shows {wanted:?}");
     }
+}
+
+#[test]
+fn the_machine_is_found_by_its_name_and_follows_it() {
+    let machine = Machine::boot(Time::Wall);
+    wait_until("line-us.local to be found", || {
+        address_of(&machine, b"\x07line-us\x05local\0") == Some([10, 0, 2, 15])
+    });
+    let mut client = machine.client();
+    let renamed = client.say("M550 Probs-lineus");
+    assert_eq!(renamed, "ok MACHINENAME:robs-lineus");
+    wait_until("robs-lineus.local to be found", || {
+        address_of(&machine, b"\x0brobs-lineus\x05local\0") == Some([10, 0, 2, 15])
+    });
+    assert!(client.say("M122").contains(" Host:robs-lineus.local "));
+    assert_eq!(address_of(&machine, b"\x07line-us\x05local\0"), None);
+}
+
+/// Asks once for the address behind a name, as a program does that knows nothing of multicast (RFC 6762,
+/// section 6.7).
+fn address_of(machine: &Machine, name: &[u8]) -> Option<[u8; 4]> {
+    let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+    socket.connect(machine.address).unwrap();
+    let patience = Duration::from_millis(500);
+    socket.set_read_timeout(Some(patience)).unwrap();
+    let header = [0xab, 0xcd, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0];
+    let question = [&header, name, &[0, 1, 0, 1]].concat();
+    socket.send(&question).unwrap();
+    let mut answer = [0; 1500];
+    let length = socket.recv(&mut answer).ok()?;
+    // Type, class, ten seconds, four bytes; then the address.
+    let record = [name, &[0, 1, 0, 1, 0, 0, 0, 10, 0, 4]].concat();
+    let at = answer[..length]
+        .windows(record.len())
+        .position(|bytes| bytes == record)?;
+    answer[at + record.len()..].first_chunk().copied()
 }
 
 #[test]

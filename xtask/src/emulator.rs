@@ -216,7 +216,11 @@ fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
         ])
         .args(["-device", "virtconsole,bus=c1.0,chardev=console"])
         .arg("-netdev")
-        .arg(format!("user,id=n0,hostfwd=tcp:{}-:1337", options.line_us))
+        .arg(format!(
+            // Its name service is asked at the same number, which is another port with UDP.
+            "user,id=n0,hostfwd=tcp:{address}-:1337,hostfwd=udp:{address}-:5353",
+            address = options.line_us
+        ))
         .args(["-device", "virtio-net-device,netdev=n0"])
         .arg("-drive")
         .arg(format!(

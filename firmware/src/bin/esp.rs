@@ -7,6 +7,7 @@ use edge_nal::TcpBind;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Ticker};
 use firmware::board::Vitals;
+use firmware::boards::embassy_udp::Multicast;
 use firmware::boards::esp::data::BOARD;
 use firmware::boards::esp::flash::FlashPartition;
 use firmware::boards::esp::inputs::Inputs;
@@ -19,7 +20,8 @@ use firmware::boards::esp::start::{self, Network, Parts};
 use firmware::boards::esp::system::Watchdog;
 use firmware::boards::esp::{Button, last_panic, pwm_timer, system};
 use firmware::services::House;
-use firmware::services::line_us::{ANYWHERE, Server};
+use firmware::services::discovery::{self, Ports};
+use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
 use firmware::services::{network, panel};
@@ -81,6 +83,7 @@ fn spawn(
         return Ok(());
     };
     let tcp = net.connections();
+    spawner.spawn(discovery(house, net.multicast())?);
     spawner.spawn(network_stack(runner)?);
     spawner.spawn(wifi(house, radio, net)?);
     for client in (0..).map_while(Client::new) {
@@ -134,6 +137,15 @@ async fn light(house: &'static House, light: Light) {
 #[embassy_executor::task]
 async fn button(house: &'static House, button: Button) {
     panel::watch(house, button).await;
+}
+
+#[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast) {
+    let ports = Ports {
+        line_us: PORT,
+        web: None,
+    };
+    discovery::run(house, &multicast, || multicast.address(), ports).await;
 }
 
 #[embassy_executor::task]

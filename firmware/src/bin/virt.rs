@@ -9,6 +9,7 @@ use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_time::{Duration, Timer};
 use firmware::boards::SETTINGS;
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
+use firmware::boards::embassy_udp::Multicast;
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::boards::virt::flash::Flash;
 use firmware::boards::virt::net::VirtNet;
@@ -21,6 +22,7 @@ use firmware::boards::virt::world::{Lines, Recorder};
 use firmware::boards::virt::{self, Wired, executor};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::discovery::{self, Ports};
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
@@ -111,7 +113,7 @@ fn start(
     memory: &'static mut Memory<Flash>,
     card: VirtNet,
 ) -> Result<(), SpawnError> {
-    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
+    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 3 }>> = StaticCell::new();
     static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; CONNECTIONS]> =
         ConstStaticCell::new([const { Buffers::new() }; _]);
     static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
@@ -126,6 +128,7 @@ fn start(
         embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
     spawner.spawn(network_stack(runner)?);
     spawner.spawn(tell_address(stack)?);
+    spawner.spawn(discovery(house, Multicast::new(stack))?);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(tcp, client, house)?);
@@ -191,6 +194,15 @@ async fn wifi(house: &'static House) {
 #[embassy_executor::task]
 async fn network_stack(mut runner: Runner<'static, VirtNet>) {
     runner.run().await;
+}
+
+#[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast) {
+    let ports = Ports {
+        line_us: PORT,
+        web: None,
+    };
+    discovery::run(house, &multicast, || multicast.address(), ports).await;
 }
 
 #[embassy_executor::task]

@@ -10,6 +10,7 @@
 //! | 4 | what it is after power-on: 1 to 4, as `M552 S` |
 //! | 5 | how its own network is called: 1 or 2, as `M552 P` |
 //! | 6 | waves: 0 or 1 |
+//! | 7 | password of its own network; no field where that is open |
 //!
 //! How it may change: a new setting gets a new tag. Firmware that does not know the tag skips it, and
 //! where a field is missing, because the record is older than the setting, the setting has its default.
@@ -19,7 +20,7 @@
 
 use super::{AccessPointName, MAX_NAME, MachineName, Settings, StartMode};
 use crate::arm::Calibration;
-use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, Network};
+use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, MAX_PASSWORD, Network, Password};
 use heapless::Vec;
 
 /// Version of the record.
@@ -31,6 +32,7 @@ const NETWORK: u8 = 3;
 const START: u8 = 4;
 const ACCESS_POINT: u8 = 5;
 const WAVES: u8 = 6;
+const OWN_PASSWORD: u8 = 7;
 
 /// Tag and length.
 const HEAD: usize = 2;
@@ -39,7 +41,8 @@ pub const MAX_RECORD: usize = 1
     + (HEAD + MAX_NAME)
     + (HEAD + Calibration::BYTES)
     + MAX_NETWORKS * (HEAD + MAX_NETWORK)
-    + 3 * (HEAD + 1);
+    + 3 * (HEAD + 1)
+    + (HEAD + MAX_PASSWORD);
 
 // Lengths are one byte.
 const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255);
@@ -58,6 +61,9 @@ impl Settings {
         put(&mut record, START, &[self.start.number()]);
         put(&mut record, ACCESS_POINT, &[self.access_point.number()]);
         put(&mut record, WAVES, &[self.waves.into()]);
+        if let Some(password) = &self.own_password {
+            put(&mut record, OWN_PASSWORD, password.as_bytes());
+        }
         record
     }
 
@@ -90,6 +96,7 @@ impl Settings {
             (START, &[number]) => self.start = StartMode::from_number(number)?,
             (ACCESS_POINT, &[number]) => self.access_point = AccessPointName::from_number(number)?,
             (WAVES, &[flag @ (0 | 1)]) => self.waves = flag == 1,
+            (OWN_PASSWORD, phrase) => self.own_password = Some(Password::new(phrase)?),
             _ => return None,
         }
         Some(())

@@ -57,8 +57,8 @@ pub enum Job<'a> {
     Stay,
     /// Nothing until then.
     Pause(Micros),
-    /// Open the machine's own network, without a password.
-    Open(&'a Ssid),
+    /// Open the machine's own network.
+    Open(&'a Network),
     /// Keep it open.
     Host,
 }
@@ -111,7 +111,7 @@ enum State {
     /// Setup: listening for others who are in setup.
     LookingAround,
     /// Setup: opening the own network.
-    Opening(Ssid),
+    Opening(Network),
     /// Setup: the own network is open.
     Hosting,
     /// Setup: the own network could not be opened; once more later.
@@ -162,7 +162,7 @@ impl Policy {
             State::Joining(network) | State::Trying(network) => Job::Join(network),
             State::Waiting(until) | State::Failed(until) => Job::Pause(*until),
             State::Connected(_) => Job::Stay,
-            State::Opening(name) => Job::Open(name),
+            State::Opening(own) => Job::Open(own),
             State::Hosting => Job::Host,
         }
     }
@@ -293,8 +293,10 @@ impl Policy {
             }
             State::LookingAround => {
                 // A radio that cannot listen may yet be able to talk.
-                let name = self.own_name(settings, heard.unwrap_or_default());
-                self.state = State::Opening(name);
+                self.state = State::Opening(Network {
+                    ssid: self.own_name(settings, heard.unwrap_or_default()),
+                    password: settings.own_password.clone(),
+                });
             }
             _ => {}
         }

@@ -35,9 +35,10 @@ fn settings() -> impl Strategy<Value = Settings> {
         uniform3(any::<i32>()),
         networks(),
         numbers,
+        option::of(vec(any::<u8>(), 8..=63)),
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves))| Settings {
+            |(name, offsets, networks, (start, access_point, waves), own)| Settings {
                 name: MachineName::new(&name).unwrap(),
                 calibration: Calibration {
                     offsets: Angles::from_array(offsets.map(Microdegrees::new)),
@@ -45,6 +46,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 networks,
                 start: StartMode::from_number(start).unwrap(),
                 access_point: AccessPointName::from_number(access_point).unwrap(),
+                own_password: own.map(|phrase| Password::new(&phrase).unwrap()),
                 waves,
             },
         )
@@ -97,7 +99,7 @@ proptest! {
     #[test]
     fn tags_of_later_firmware_are_skipped(
         settings in settings(),
-        tag in 7..=255u8,
+        tag in 8..=255u8,
         value in vec(any::<u8>(), 0..=255),
         place: prop::sample::Index,
     ) {
@@ -135,7 +137,8 @@ fn the_bytes_of_a_record() {
         \x03\x05\x04open\
         \x04\x01\x04\
         \x05\x01\x02\
-        \x06\x01\x00";
+        \x06\x01\x00\
+        \x07\x08\x00\xffsecret";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -150,12 +153,15 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.start, StartMode::StationLongPress);
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
+    let password = settings.own_password.as_ref().unwrap();
+    assert_eq!(password.as_bytes(), b"\x00\xffsecret");
 }
 
 #[test]
 fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
+        own_password: Password::new(&[0xff; MAX_PASSWORD]),
         ..Settings::default()
     };
     for number in 0..MAX_NETWORKS {
@@ -200,6 +206,8 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x05\x01\x03",
         b"\x06\x01\x02",
         b"\x06\x00",
+        b"\x07\x00",
+        b"\x07\x07seven..",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(
