@@ -4,7 +4,7 @@ use super::*;
 use crate::arm::Angles;
 use crate::motion::Microdegrees;
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Networks, Password, Ssid};
-use proptest::array::uniform3;
+use proptest::array::{uniform3, uniform4};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -30,22 +30,29 @@ fn networks() -> impl Strategy<Value = Networks> {
 
 fn settings() -> impl Strategy<Value = Settings> {
     let numbers = (1..=4u8, 1..=2u8, any::<bool>());
+    let fitting = (uniform4(-500..=500i16), -200..=200i16, 0..8u8);
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
+        fitting,
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves))| Settings {
-                name: MachineName::new(&name).unwrap(),
-                calibration: Calibration {
-                    offsets: Angles::from_array(offsets.map(Microdegrees::new)),
-                },
-                networks,
-                start: StartMode::from_number(start).unwrap(),
-                access_point: AccessPointName::from_number(access_point).unwrap(),
-                waves,
+            |(name, offsets, networks, (start, access_point, waves), (map, shift, servos))| {
+                Settings {
+                    name: MachineName::new(&name).unwrap(),
+                    calibration: Calibration {
+                        offsets: Angles::from_array(offsets.map(Microdegrees::new)),
+                    },
+                    networks,
+                    start: StartMode::from_number(start).unwrap(),
+                    access_point: AccessPointName::from_number(access_point).unwrap(),
+                    waves,
+                    map: ZMap::new(map).unwrap(),
+                    shift: NibShift::from_hundredths(shift).unwrap(),
+                    directions: Directions::from_byte(servos).unwrap(),
+                }
             },
         )
 }
@@ -97,7 +104,7 @@ proptest! {
     #[test]
     fn tags_of_later_firmware_are_skipped(
         settings in settings(),
-        tag in 7..=255u8,
+        tag in 100..=255u8,
         value in vec(any::<u8>(), 0..=255),
         place: prop::sample::Index,
     ) {
@@ -135,7 +142,10 @@ fn the_bytes_of_a_record() {
         \x03\x05\x04open\
         \x04\x01\x04\
         \x05\x01\x02\
-        \x06\x01\x00";
+        \x06\x01\x00\
+        \x18\x08\0\0\x64\0\x2c\x01\x38\xff\
+        \x19\x02\xab\xff\
+        \x1a\x01\x02";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -150,6 +160,9 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.start, StartMode::StationLongPress);
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
+    assert_eq!(settings.map.corners(), [0, 100, 300, -200]);
+    assert_eq!(settings.shift.hundredths(), -85);
+    assert_eq!(settings.directions.reversed, [false, true, false]);
 }
 
 #[test]
@@ -200,6 +213,11 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x05\x01\x03",
         b"\x06\x01\x02",
         b"\x06\x00",
+        b"\x18\x07\0\0\0\0\0\0\0",
+        b"\x18\x08\0\0\0\0\0\0\xf5\x01",
+        b"\x19\x02\xc9\x00",
+        b"\x19\x01\x00",
+        b"\x1a\x01\x08",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(
