@@ -24,8 +24,13 @@ pub struct Plotter {
 impl Plotter {
     /// It gives a set-point each `frame_us`.
     pub fn new(frame_us: u64) -> Self {
+        Self::of(ArmData::default(), frame_us)
+    }
+
+    /// On some other board.
+    pub fn of(data: ArmData, frame_us: u64) -> Self {
         let mut plotter = Self {
-            machine: Machine::new(ArmData::default(), Calibration::default()),
+            machine: Machine::new(data, Calibration::default()),
             frame_us,
             now_us: 0,
             frames: Vec::new(),

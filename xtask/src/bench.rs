@@ -89,6 +89,12 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
             peers: vec![("f32 with libm", of("set-point, f32 with libm")?)],
         },
         Row {
+            work: "set-point with map and shift",
+            goal: Goal::Instructions(550),
+            measured: of("set-point, map and shift")?,
+            peers: vec![],
+        },
+        Row {
             work: "set-point of a plan",
             goal: Goal::Instructions(450),
             measured: of("set-point of a plan")?,
@@ -96,8 +102,14 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
         },
         Row {
             work: "plan a segment",
-            goal: Goal::Instructions(20_000),
+            goal: Goal::Instructions(8_000),
             measured: of("plan a segment")?,
+            peers: vec![],
+        },
+        Row {
+            work: "begin a segment",
+            goal: Goal::Instructions(5_000),
+            measured: of("set-point that begins a segment")?,
             peers: vec![],
         },
         Row {

@@ -42,9 +42,10 @@ async fn main(spawner: Spawner) {
         vitals.last_panic,
     );
 
+    static MEMORY: StaticCell<Memory<FlashPartition>> = StaticCell::new();
     let mut memory = parts.settings.take().and_then(|partition| {
         let whole = 0..partition.size();
-        Memory::new(partition, whole)
+        Some(MEMORY.init(Memory::new(partition, whole)?))
     });
     let settings = match &mut memory {
         Some(memory) => memory.load().await.0,
@@ -60,7 +61,7 @@ async fn main(spawner: Spawner) {
 fn spawn(
     spawner: Spawner,
     house: &'static House,
-    memory: Option<Memory<FlashPartition>>,
+    memory: Option<&'static mut Memory<FlashPartition>>,
     parts: Parts,
 ) -> Result<(), SpawnError> {
     parts.urgent.spawn(arm(house, parts.servos)?);
@@ -108,7 +109,7 @@ async fn arm(house: &'static House, ports: ServoPorts) {
 }
 
 #[embassy_executor::task]
-async fn storage(house: &'static House, memory: Option<Memory<FlashPartition>>) {
+async fn storage(house: &'static House, memory: Option<&'static mut Memory<FlashPartition>>) {
     match memory {
         Some(memory) => {
             house.store.run(memory).await;

@@ -57,10 +57,12 @@ fn main() -> ! {
 /// Reads the settings, then starts everything else.
 #[embassy_executor::task]
 async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtNet, disk: Flash) {
-    let Some(mut memory) = Memory::new(disk, SETTINGS) else {
+    let Some(memory) = Memory::new(disk, SETTINGS) else {
         log::error!("the settings do not lie in whole pages");
         return;
     };
+    static MEMORY: StaticCell<Memory<Flash>> = StaticCell::new();
+    let memory = MEMORY.init(memory);
     // QEMU that takes no sleep (`-icount sleep=off`) now and then forgets a disk that answers while no
     // alarm is set: so there is one.
     let alarm = async {
@@ -91,7 +93,7 @@ fn start(
     spawner: Spawner,
     tick: embassy_executor::SendSpawner,
     house: &'static House,
-    memory: Memory<Flash>,
+    memory: &'static mut Memory<Flash>,
     card: VirtNet,
 ) -> Result<(), SpawnError> {
     static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
@@ -142,7 +144,7 @@ async fn servo_tick(house: &'static House) {
 }
 
 #[embassy_executor::task]
-async fn storage(house: &'static House, memory: Memory<Flash>) {
+async fn storage(house: &'static House, memory: &'static mut Memory<Flash>) {
     house.store.run(memory).await;
 }
 

@@ -100,6 +100,15 @@ impl Arm {
         self.deliver();
     }
 
+    /// Lets a stopped arm move again; says whether it was stopped.
+    pub fn resume(&self) -> bool {
+        self.with(|machine| {
+            let stopped = machine.stopped().is_some();
+            machine.resume();
+            stopped
+        })
+    }
+
     /// The servo tick: one set-point in each of the servos' frames, which are `length` apart, for ever.
     ///
     /// The machine's time is the number of frames, so that a set-point is a function of the moves and

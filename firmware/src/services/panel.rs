@@ -131,6 +131,8 @@ pub async fn watch(house: &House, mut pin: impl Wait + InputPin) -> ! {
 
 async fn act(house: &House, gesture: Gesture) {
     match gesture {
+        // What a person wants first of a machine that is stopped.
+        Gesture::Short if house.arm.resume() => info!("resumed by the button"),
         Gesture::Short | Gesture::Long => house.wifi.press(gesture),
         Gesture::ResetWarning => house.panel.show_first(Some(Lamp::ResetWarning)),
         Gesture::ResetCancelled => house.panel.show_first(None),

@@ -53,24 +53,25 @@ pub async fn serve<R: Read, W: Write>(
             break;
         }
         let wait = port.wait;
+        // Replies first: they make room for what a burst of lines asks for.
         let happened = select4(
-            read(&mut from, &mut chunk, ended),
             port.outbox.write_to(&mut to),
+            read(&mut from, &mut chunk, ended),
             wait.on(arm),
             inputs.changed(),
         );
         match happened.await {
-            Either4::First(Ok(0)) => ended = true,
-            Either4::First(Ok(length)) => {
+            Either4::First(written) => port.outbox.written(written),
+            Either4::Second(Ok(0)) => ended = true,
+            Either4::Second(Ok(length)) => {
                 port.receive(chunk.get(..length).unwrap_or_default());
                 // A host that floods would else keep everybody waiting.
                 if length == CHUNK {
                     yield_now().await;
                 }
             }
-            Either4::First(Err(_)) if on_error == ReadError::ByteLost => port.lose_byte(),
-            Either4::First(Err(_)) => ended = true,
-            Either4::Second(written) => port.outbox.written(written),
+            Either4::Second(Err(_)) if on_error == ReadError::ByteLost => port.lose_byte(),
+            Either4::Second(Err(_)) => ended = true,
             Either4::Third(()) | Either4::Fourth(()) => {}
         }
     }

@@ -627,6 +627,14 @@ mod tests {
     }
 
     #[test]
+    fn a_stopped_machine_says_how_to_go_on() {
+        assert_eq!(
+            said(|reply| reply.report(&Report::Stopped)),
+            "error INFO:\"the machine is stopped: send ~ on the serial line or press the button\""
+        );
+    }
+
+    #[test]
     fn every_token_of_the_diagnostics_has_a_colon() {
         let longest = MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap();
         let text = said(|reply| {

@@ -78,12 +78,16 @@ impl Default for PlanData {
 pub(crate) struct Full;
 
 /// The plan, and its motion while it has the arm.
+///
+/// In the order written, for the same reason as [`Machine`](crate::machine::Machine).
 #[derive(Debug)]
+#[repr(C)]
 pub(crate) struct Planner {
     table: Table,
     depth: PenDepth,
     limits: Limits,
-    queue: Deque<Block, { PLAN_SEGMENTS + APPROACH }>,
+    /// When the stage under way ends; 0 when there is none.
+    ends: Moment,
     stage: Stage,
     pen: Pen,
     /// Where the segment under way begins, or the arm stands.
@@ -98,6 +102,7 @@ pub(crate) struct Planner {
     /// What is switched when the segment under way, and its dwell, have been done.
     then: Switches,
     changed: bool,
+    queue: Deque<Block, { PLAN_SEGMENTS + APPROACH }>,
 }
 
 impl Planner {
@@ -113,6 +118,7 @@ impl Planner {
                 degrees_per_second,
             },
             queue: Deque::new(),
+            ends: Moment::default(),
             stage: Stage::Idle,
             pen: Pen::new(lift, data.pen_speed.min(degrees_per_second)),
             place: (HOME.x, HOME.y),
@@ -134,8 +140,8 @@ impl Planner {
     pub(crate) fn switch(&mut self, assist: Assist, on: bool) {
         match (self.queue.back_mut(), &self.stage) {
             (Some(last), _) => last.then.set(assist, on),
-            (None, Stage::Moving(_) | Stage::Dwelling(_)) => self.then.set(assist, on),
-            (None, Stage::Idle | Stage::Pen(_) | Stage::Lingering(_)) => {
+            (None, Stage::Moving(_) | Stage::Dwelling) => self.then.set(assist, on),
+            (None, Stage::Idle | Stage::Pen | Stage::Lingering) => {
                 self.then.set(assist, on);
                 self.then.switch(&mut self.outputs);
             }
@@ -159,11 +165,7 @@ impl Planner {
 
     /// Whether everything planned has been done; the pen may still be on its way up.
     pub(crate) fn is_done(&self) -> bool {
-        self.queue.is_empty()
-            && matches!(
-                self.stage,
-                Stage::Idle | Stage::Lingering(_) | Stage::Pen(_)
-            )
+        self.queue.is_empty() && matches!(self.stage, Stage::Idle | Stage::Lingering | Stage::Pen)
     }
 
     /// Whether a segment has begun or been forgotten, or everything is done, since the last call.
@@ -173,10 +175,8 @@ impl Planner {
 
     /// When the last motion that is planned ends.
     pub(crate) fn ends(&self) -> Option<Micros> {
-        if !self.queue.is_empty() {
-            return None;
-        }
-        self.stage_ends().map(Moment::micros)
+        let last = self.has_the_arm() && self.queue.is_empty();
+        last.then(|| self.ends.micros())
     }
 
     /// Adds a segment. The set-points up to `told` have been given, what comes later can be planned anew.
@@ -223,8 +223,8 @@ impl Planner {
         let _ = self.queue.push_back(block);
         self.end = block.to;
         let told = Moment::from(told);
-        if let Stage::Lingering(until) = &mut self.stage {
-            *until = (*until).min(told.max(self.clock));
+        if matches!(self.stage, Stage::Lingering) {
+            self.ends = self.ends.min(told.max(self.clock));
         }
         self.look_ahead(told);
         Ok(())
@@ -258,7 +258,7 @@ impl Planner {
         self.link_the_first();
         self.look_ahead(self.clock);
         // The next call of `advance` begins.
-        self.stage = Stage::Lingering(self.clock);
+        self.enter(Stage::Lingering, self.clock);
     }
 
     /// Everything planned is forgotten. The arm stays at `position`, and the pen rises.
@@ -266,17 +266,15 @@ impl Planner {
         self.forget(position);
         self.clock = now.into();
         self.pen.put(position.z, self.clock);
-        self.stage = if position.z == PEN_UP {
-            Stage::Idle
-        } else {
-            self.send_pen(PEN_UP, self.clock)
-        };
+        if position.z != PEN_UP {
+            self.send_pen(PEN_UP, self.clock);
+        }
     }
 
     /// Everything planned is forgotten, and the arm is somebody else's.
     pub(crate) fn forget(&mut self, position: Position) {
         self.queue.clear();
-        self.stage = Stage::Idle;
+        self.enter(Stage::Idle, Moment::default());
         self.place = (position.x, position.y);
         self.end = self.place;
         self.leads_off = false;

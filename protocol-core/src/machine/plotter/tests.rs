@@ -171,20 +171,19 @@ fn a_slow_stream_does_not_stop_at_every_segment() {
     let mut arm = Arm::new();
     arm.seek(5, 5);
     arm.rest();
-    // A millimetre takes 20 ms at 50 mm/s, and 90 ms from rest to rest.
-    for x in 6..9 {
-        arm.feed(x, 5);
-    }
-    arm.run(70);
-    let mut last = arm.machine.last.position;
-    for x in 9..45 {
-        arm.feed(x, 5);
-        for _ in 0..3 {
-            let now = arm.tick().position;
-            assert!(now.x > last.x, "stands at {now:?} before segment {x}");
-            last = now;
+    // One segment ahead of the one under way: from rest to rest, a millimetre would take 90 ms; two
+    // ahead of a stop allow 45 mm/s, one 32 mm/s.
+    let begun = arm.now;
+    let mut x = 5;
+    while x < 45 {
+        if arm.machine.plan_room() == PLAN_SEGMENTS {
+            x += 1;
+            arm.feed(x, 5);
         }
+        arm.tick();
     }
+    let per_segment = (arm.now - begun) / 40 / MS;
+    assert!((22..=32).contains(&per_segment), "{per_segment} ms");
 }
 
 #[test]

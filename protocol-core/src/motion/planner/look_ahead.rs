@@ -46,6 +46,7 @@ impl Planner {
             running.profile = Profile::new(task, self.limits.acceleration);
             running.begun = running.begun.max(told);
             running.exit = exit;
+            self.ends = running.ends();
         }
     }
 

@@ -1,6 +1,6 @@
 //! The pen as a plotter's laser: how deep, how fast, and whether it is where it should be.
 
-use super::super::units::{Coordinate, Micros, PEN_UP};
+use super::super::units::{Coordinate, Micros, PEN_DOWN, PEN_DOWN_BELOW, PEN_UP};
 use super::moment::Moment;
 use crate::arm::PenLift;
 
@@ -9,19 +9,44 @@ use crate::arm::PenLift;
 /// An intensity of 1 is `contact`, one of 255 `full`, and what is between them lies in between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PenDepth {
-    /// Where the pen touches lightly.
-    pub contact: Coordinate,
-    /// Where it is pressed down most.
-    pub full: Coordinate,
+    contact: Coordinate,
+    full: Coordinate,
+}
+
+impl PenDepth {
+    /// Z 400 and Z 0.
+    pub const DEFAULT: Self = Self {
+        contact: Coordinate::from_units(400),
+        full: PEN_DOWN,
+    };
+
+    /// Z where the pen touches lightly, and Z where it is pressed down most. `None` unless both are heights
+    /// of a pen that is down, 0 up to below 500, and the second is not above the first.
+    pub const fn new(contact: Coordinate, full: Coordinate) -> Option<Self> {
+        let down = full.bits() >= PEN_DOWN.bits()
+            && full.bits() <= contact.bits()
+            && contact.bits() < PEN_DOWN_BELOW.bits();
+        if down {
+            Some(Self { contact, full })
+        } else {
+            None
+        }
+    }
+
+    /// Z where the pen touches lightly.
+    pub const fn contact(&self) -> Coordinate {
+        self.contact
+    }
+
+    /// Z where the pen is pressed down most.
+    pub const fn full(&self) -> Coordinate {
+        self.full
+    }
 }
 
 impl Default for PenDepth {
-    /// Z 400 and Z 0.
     fn default() -> Self {
-        Self {
-            contact: Coordinate::from_units(400),
-            full: Coordinate::from_units(0),
-        }
+        Self::DEFAULT
     }
 }
 
@@ -143,6 +168,19 @@ mod tests {
             let found = f64::from(depth.below_contact(Intensity(intensity))) / 65536.0;
             assert!((found - below).abs() < 0.001, "S{intensity}: {found}");
         }
+    }
+
+    #[test]
+    fn a_pen_that_draws_is_down() {
+        let depth = |contact: i16, full: i16| {
+            PenDepth::new(
+                Coordinate::from_units(contact),
+                Coordinate::from_units(full),
+            )
+        };
+        assert_eq!(depth(400, 0), Some(PenDepth::DEFAULT));
+        assert!(depth(499, 499).is_some());
+        assert_eq!([depth(500, 0), depth(300, 301), depth(300, -1)], [None; 3]);
     }
 
     #[test]

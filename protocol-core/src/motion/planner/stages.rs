@@ -6,6 +6,7 @@ use super::block::Block;
 use super::moment::{Moment, fine};
 use super::profile::{Profile, Task};
 use super::{Planner, STREAM_GAP};
+use crate::arm::high_half;
 
 /// What happened while time went on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,23 +34,39 @@ pub(super) enum Stage {
     /// The arm is somebody else's.
     Idle,
     /// The pen goes up or down.
-    Pen(Moment),
+    Pen,
     Moving(Running),
-    Dwelling(Moment),
+    Dwelling,
     /// The queue is empty; the host may go on.
-    Lingering(Moment),
+    Lingering,
 }
 
 impl Planner {
     /// Lets everything happen that happens until `now`, or until something has to be told.
+    #[inline]
     pub(crate) fn advance(&mut self, now: Micros) -> Option<PlanEvent> {
         let now = Moment::from(now);
+        if self.ends > now {
+            return None;
+        }
+        self.go_on(now)
+    }
+
+    /// Whether what is under way is still so after `now`.
+    #[inline]
+    pub(crate) fn lasts_beyond(&self, now: Micros) -> bool {
+        self.ends > now.into()
+    }
+
+    #[inline(never)]
+    fn go_on(&mut self, now: Moment) -> Option<PlanEvent> {
         // Each turn ends a stage; a block has at most three.
-        while let Some(ends) = self.stage_ends().filter(|ends| *ends <= now) {
+        while self.ends <= now {
+            let ends = self.ends;
             self.clock = ends;
             match self.stage {
                 Stage::Idle => return None,
-                Stage::Pen(_) => {
+                Stage::Pen => {
                     self.pen.arrive(ends);
                     if self.queue.is_empty() {
                         return Some(self.over());
@@ -63,18 +80,18 @@ impl Planner {
                         return Some(PlanEvent::Limit(side));
                     }
                     if running.block.dwell > Micros::default() {
-                        self.stage = Stage::Dwelling(ends.after(fine(running.block.dwell)));
+                        self.enter(Stage::Dwelling, ends.after(fine(running.block.dwell)));
                         continue;
                     }
                     self.then.switch(&mut self.outputs);
                 }
-                Stage::Dwelling(_) => self.then.switch(&mut self.outputs),
-                Stage::Lingering(_) => {
+                Stage::Dwelling => self.then.switch(&mut self.outputs),
+                Stage::Lingering => {
                     if self.queue.is_empty() {
                         if self.pen.is_up() {
                             return Some(self.over());
                         }
-                        self.stage = self.send_pen(PEN_UP, ends);
+                        self.send_pen(PEN_UP, ends);
                         continue;
                     }
                 }
@@ -87,7 +104,7 @@ impl Planner {
     }
 
     fn over(&mut self) -> PlanEvent {
-        self.stage = Stage::Idle;
+        self.enter(Stage::Idle, Moment::default());
         self.changed = true;
         PlanEvent::Over
     }
@@ -118,17 +135,14 @@ impl Planner {
         }
     }
 
-    pub(super) const fn stage_ends(&self) -> Option<Moment> {
-        match &self.stage {
-            Stage::Idle => None,
-            Stage::Pen(ends) | Stage::Dwelling(ends) | Stage::Lingering(ends) => Some(*ends),
-            Stage::Moving(running) => Some(running.begun.after(running.profile.duration())),
-        }
+    pub(super) fn enter(&mut self, stage: Stage, ends: Moment) {
+        (self.stage, self.ends) = (stage, ends);
     }
 
     /// Sends the pen somewhere.
-    pub(super) fn send_pen(&mut self, to: Coordinate, now: Moment) -> Stage {
-        Stage::Pen(now.after(fine(self.pen.send(to, now))))
+    pub(super) fn send_pen(&mut self, to: Coordinate, now: Moment) {
+        let takes = self.pen.send(to, now);
+        self.enter(Stage::Pen, now.after(fine(takes)));
     }
 
     /// Begins what is next; a side of the table when that is in the way at once.
@@ -148,10 +162,10 @@ impl Planner {
             let (ready, height) = if block.intensity.is_off() {
                 (self.pen.is_up(), PEN_UP)
             } else {
-                (self.pen.is_down(), self.depth.contact)
+                (self.pen.is_down(), self.depth.contact())
             };
             if !ready {
-                self.stage = self.send_pen(height, now);
+                self.send_pen(height, now);
                 return None;
             }
             let Some(block) = self.queue.pop_front() else {
@@ -159,11 +173,12 @@ impl Planner {
             };
             self.changed = true;
             self.then = block.then;
-            self.stage = Stage::Moving(self.run(block, now));
+            let running = self.run(block, now);
+            self.enter(Stage::Moving(running), running.ends());
             return None;
         }
         self.changed = true;
-        self.stage = Stage::Lingering(now.after(fine(STREAM_GAP)));
+        self.enter(Stage::Lingering, now.after(fine(STREAM_GAP)));
         None
     }
 
@@ -182,7 +197,7 @@ impl Planner {
             let below = i64::from(self.depth.below_contact(block.intensity));
             let pressure = (below << 16) / i64::from(block.nominal.max(1));
             let pressure = i32::try_from(pressure).unwrap_or(i32::MAX);
-            (self.depth.contact, pressure)
+            (self.depth.contact(), pressure)
         };
         Running {
             profile: Profile::new(task, self.limits.acceleration),
@@ -196,6 +211,10 @@ impl Planner {
 }
 
 impl Running {
+    pub(super) const fn ends(&self) -> Moment {
+        self.begun.after(self.profile.duration())
+    }
+
     /// Of the pen at a speed.
     #[inline]
     fn height(&self, speed: u32) -> i32 {
@@ -203,11 +222,11 @@ impl Running {
     }
 }
 
-/// A coordinate after some distance; never beyond either end.
+/// A coordinate after some distance, within a last place; never beyond either end.
 #[inline]
 fn on_the_way(from: Coordinate, to: Coordinate, unit: i32, distance: u32) -> Coordinate {
-    const HALF: i64 = 1 << 29;
-    let along = ((i64::from(unit) * i64::from(distance) + HALF) >> 30) as i32;
+    // The direction is in 1/2^30, a distance has 28 bits.
+    let along = high_half(unit, (distance << 2).cast_signed());
     let whole = to.bits() - from.bits();
     let along = if whole < 0 {
         along.max(whole)
