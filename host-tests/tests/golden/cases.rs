@@ -138,22 +138,24 @@ pub const DECIMAL_STEPS: &[&str] = &[
     "G54 S1.1\nG94 P3.3\nG01 X900\nG01 X909",
 ];
 
-/// Moves without scale, origin and calibration.
+/// Moves without scale, origin and calibration. No way is a whole number of steps: where offsets are taken off the
+/// angles and put back, a unit in the last place would make one more.
 pub const BARE_MOVES: &[(&str, &str)] = &[
     (
         "all axes",
-        "G40 X1400 Y-300 Z700\nG40 X1200 Y600 Z0\nG40 X1000 Y1000 Z1000\nG01 X1100 Z0\nG40 X1100 Y1000 Z500",
+        "G40 X1400 Y-300 Z700\nG40 X1200 Y605 Z0\nG40 X1000 Y1000 Z1000\nG01 X1100 Z0\nG40 X1100 Y1000 Z500",
     ),
     (
         "what is left out stays",
-        "G40 X1400 Y-300 Z700\nG40 Y200\nG40 X1500\nG40 Z100\nG40\nG01 Z0\nG40 X1450",
+        "G40 X1400 Y-300 Z700\nG40 Y203\nG40 X1502\nG40 Z103\nG40\nG01 Z0\nG40 X1450",
     ),
     (
         "scale and origin, and not",
-        "G54 X100 Y-50 S2\nG40 X1300 Y400 Z600\nG01 X600 Y200 Z0\nG40 X600 Y200 Z300 Kxy\nG40 X1300 Y300 Z300 Kz\nG40 Z0 Kz\nG40 X650 Kxy",
+        "G54 X100 Y-50 S2\nG40 X1300 Y405 Z610\nG01 X600 Y200 Z0\nG40 X600 Y200 Z303 Kxy\nG40 X1300 Y302 Z301 Kz\n\
+         G40 Z2 Kz\nG40 X652 Kxy",
     ),
     (
         "out of reach",
-        "G01 Z0\nG40 X3000 Y0\nG40 X1500 Y0 Z2000\nG40 X1500 Y0 Z-20\nG40 X0 Y0 Z800\nG40 X2500 Y100 Z100 Kxy",
+        "G01 Z0\nG40 X3000 Y0\nG40 X1503 Y0 Z2000\nG40 X1501 Y0 Z-20\nG40 X0 Y0 Z800\nG40 X2500 Y100 Z100 Kxy",
     ),
 ];
