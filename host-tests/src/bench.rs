@@ -1,7 +1,7 @@
 //! The core's sessions and machine wired as the firmware's services wire them, without sockets, tasks
 //! and real time: a line in, a reply out, and every set-point on record.
 
-use protocol_core::arm::Calibration;
+use protocol_core::arm::{Calibration, Compensation, Directions};
 use protocol_core::lineus::{Diagnostics, Identity, Reply, Request, Session};
 use protocol_core::machine::{ArmData, Client, Errand, MAX_CLIENTS, Machine, Report, SetPoint};
 use protocol_core::motion::{Micros, Steps};
@@ -179,6 +179,8 @@ impl Bench {
                 uptime: Micros::new(self.next_us),
                 position: self.machine.position(),
                 calibration: self.machine.calibration(),
+                compensation: self.machine.compensation(),
+                directions: self.machine.directions(),
                 wifi: &Status {
                     setup: false,
                     phase: Phase::Searching,
@@ -206,6 +208,40 @@ impl Bench {
             | Request::Remember { .. }
             | Request::Forget(_)
             | Request::ForgetAll => reply.ok(),
+            Request::Compensation => {
+                let now = self.machine.compensation();
+                reply.compensation(now.map(), now.shift());
+            }
+            Request::SetCompensation { map, shift } => {
+                self.at_rest(client, |bench| {
+                    let now = bench.machine.compensation();
+                    let map = map.unwrap_or(now.map());
+                    let shift = shift.unwrap_or(now.shift());
+                    let new = Compensation::new(map, shift);
+                    bench.machine.set_compensation(new);
+                });
+                reply.ok();
+            }
+            Request::Directions => reply.directions(self.machine.directions()),
+            Request::SetDirections(servos) => {
+                self.at_rest(client, |bench| {
+                    let mut new = bench.machine.directions();
+                    for (new, wanted) in new.reversed.iter_mut().zip(servos) {
+                        *new = wanted.unwrap_or(*new);
+                    }
+                    bench.machine.set_directions(new);
+                });
+                reply.ok();
+            }
+            Request::FactoryReset => {
+                self.at_rest(client, |bench| {
+                    bench.name = MachineName::default();
+                    bench.machine.set_calibration(Calibration::default());
+                    bench.machine.set_compensation(Compensation::default());
+                    bench.machine.set_directions(Directions::default());
+                });
+                reply.ok();
+            }
             Request::Calibrate => {
                 self.at_rest(client, |bench| {
                     let here = bench.machine.calibration_here();

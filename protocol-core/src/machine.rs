@@ -21,17 +21,18 @@
 
 mod data;
 mod errand;
+mod fitting;
 mod motion;
 mod plotter;
 
-pub use data::{ArmData, SetPoint, position_of};
-pub use errand::{Client, Errand, Limited, MAX_ASKERS, MAX_CLIENTS, Manner, Report, Target};
+pub use data::{ArmData, SetPoint, nib_of, position_of};
+pub use errand::{Bare, Client, Errand, Limited, MAX_ASKERS, MAX_CLIENTS, Manner, Report, Target};
 pub use plotter::{NotPlanned, StopReason};
 
-use crate::arm::{Angles, Calibration, HOME_ANGLES, Pulses, forward, inverse};
+use crate::arm::{Calibration, Compensation, Directions, Pulses};
 use crate::motion::{
-    Coordinate, DEFAULT_STEPS, HOME, Line, Micros, PEN_DOWN, PEN_UP, PlanEvent, Planner, Position,
-    Rapid, Side, Steps, Wave, closest, hold,
+    DEFAULT_STEPS, HOME, Line, MOST_DWELL, Micros, PEN_UP, PlanEvent, Planner, Position, Rapid,
+    Side, Steps, Wave, closest, hold,
 };
 use heapless::Deque;
 use motion::{Active, Motion};
@@ -61,6 +62,9 @@ const MAX_TURNS: usize = MAX_ASKERS + 1;
 pub struct Machine {
     data: ArmData,
     calibration: Calibration,
+    compensation: Compensation,
+    /// Already in the ranges of `data`.
+    directions: Directions,
     steps: Steps,
     /// Where the last move ended, or the one under way began.
     position: Position,
@@ -92,6 +96,8 @@ impl Machine {
         let mut machine = Self {
             data,
             calibration,
+            compensation: Compensation::default(),
+            directions: Directions::default(),
             steps: DEFAULT_STEPS,
             position: HOME,
             short: false,
@@ -205,6 +211,15 @@ impl Machine {
             self.advance(now);
         }
         let (position, held) = match &self.active {
+            Some(Active {
+                motion: Motion::Dwell(position, _),
+                ..
+            }) => {
+                let position = *position;
+                // The end of a dwell need not be waited for: nobody draws in it.
+                self.lift_abandoned_pen(now);
+                (position, false)
+            }
             Some(active) => {
                 // A move takes less than 2^32 us.
                 let elapsed = (now - active.begun).get() as u32;
@@ -266,12 +281,7 @@ impl Machine {
         }
     }
 
-    /// Where the servos are now, in the model's angles.
-    pub fn angles(&self) -> Angles {
-        inverse(self.position(), self.data.lift)
-    }
-
-    /// What the board says about the arm.
+    /// What the board says about the arm, with the servos' directions in it.
     pub const fn data(&self) -> &ArmData {
         &self.data
     }
@@ -286,41 +296,6 @@ impl Machine {
         self.steps = steps;
     }
 
-    /// The calibration in force.
-    pub const fn calibration(&self) -> Calibration {
-        self.calibration
-    }
-
-    /// The calibration by which the servos, as they stand now, stand at the calibration point, which
-    /// is home (`reference/arm.md`, calibration).
-    pub fn calibration_here(&self) -> Calibration {
-        Calibration::between(self.told(), HOME_ANGLES)
-    }
-
-    /// Puts a calibration in force. The servos stay where they are, and the arm's position becomes
-    /// what they now mean; where that is outside the drawing area or its heights, they go to its edge in
-    /// the next frame.
-    pub fn set_calibration(&mut self, calibration: Calibration) {
-        let model = calibration.remove(self.told());
-        self.calibration = calibration;
-        let position = if model == HOME_ANGLES {
-            HOME
-        } else {
-            forward(model, self.data.lift)
-        };
-        (self.position, _) = hold(position);
-        self.active = None;
-        if self.plan.has_the_arm() {
-            self.plan.forget(self.position);
-        }
-    }
-
-    /// What the servos were told last, or at rest will have been told at the next frame, calibration
-    /// included.
-    fn told(&self) -> Angles {
-        self.calibration.apply(self.angles())
-    }
-
     #[inline]
     fn begin(&mut self, client: Client, errand: &Errand) -> Report {
         match errand {
@@ -329,6 +304,13 @@ impl Machine {
                 self.lift_at = None;
                 self.start(*manner, target)
             }
+            Errand::Uncalibrated(target, bare) => {
+                self.last_mover = Some(client);
+                self.lift_at = None;
+                let (target, limited) = self.without_offsets(target, *bare);
+                self.start_limited(Manner::Straight, &target, limited)
+            }
+            Errand::Dwell(duration) => self.dwell_for(*duration),
             Errand::Wave => self.wave(),
             Errand::Rest => {
                 self.resting_for = Some(client);
@@ -353,8 +335,33 @@ impl Machine {
         }
     }
 
+    fn dwell_for(&mut self, duration: Micros) -> Report {
+        let duration = duration.min(MOST_DWELL);
+        self.active = Some(Active {
+            begun: self.clock,
+            ends: self.clock + duration,
+            short: self.short,
+            motion: Motion::Dwell(self.position, duration),
+        });
+        Report::Moving {
+            end: self.position,
+            limited: None,
+        }
+    }
+
     fn start(&mut self, manner: Manner, target: &Target) -> Report {
-        let (end, mut limited) = self.reachable(target);
+        self.start_limited(manner, target, None)
+    }
+
+    /// Starts a move whose target has been limited before.
+    fn start_limited(
+        &mut self,
+        manner: Manner,
+        target: &Target,
+        before: Option<Limited>,
+    ) -> Report {
+        let (end, limited) = self.reachable(target);
+        let mut limited = before.or(limited);
         let motion = match manner {
             Manner::Straight => Motion::Line(Line::new(self.position, end, self.steps)),
             Manner::Rapid => Motion::Rapid(Rapid::new(
@@ -381,10 +388,7 @@ impl Machine {
     fn reachable(&self, target: &Target) -> (Position, Option<Limited>) {
         let x = target.x.unwrap_or(self.position.x.into());
         let y = target.y.unwrap_or(self.position.y.into());
-        let z = target.z.map_or(self.position.z, |z| {
-            let within = z.bits().clamp(PEN_DOWN.bits().into(), PEN_UP.bits().into());
-            Coordinate::from_bits(within as i32)
-        });
+        let z = target.z.map_or(self.position.z, fitting::within_lift);
         let (near_x, near_y) = closest(x, y);
         let mut end = Position {
             x: near_x,
@@ -419,7 +423,7 @@ impl Machine {
 
     #[inline]
     fn pulses(&self, position: Position) -> Pulses {
-        let told = self.calibration.apply(inverse(position, self.data.lift));
+        let told = self.calibration.apply(self.angles_at(position));
         let [shoulder, elbow, pen] = &self.data.servos;
         [
             shoulder.pulse(told.shoulder),

@@ -5,7 +5,7 @@ mod record;
 
 pub use record::MAX_RECORD;
 
-use crate::arm::Calibration;
+use crate::arm::{Calibration, Compensation, Directions, NibShift, ZMap};
 use crate::wifi::{Networks, Password};
 use heapless::String;
 
@@ -127,10 +127,23 @@ pub struct Settings {
     pub own_password: Option<Password>,
     /// Whether it makes its little waves (M291).
     pub waves: bool,
+    /// How high the paper lies (G31).
+    pub map: ZMap,
+    /// How the nib moves as it comes down (G31).
+    pub shift: NibShift,
+    /// Which servos turn the other way (M280).
+    pub directions: Directions,
+}
+
+impl Settings {
+    /// Map and shift, ready for use.
+    pub fn compensation(&self) -> Compensation {
+        Compensation::new(self.map, self.shift)
+    }
 }
 
 impl Default for Settings {
-    /// `line-us`, no calibration, no network, its own one open, a station that waves.
+    /// `line-us`, no calibration, no network, its own one open, a station that waves, on flat paper.
     fn default() -> Self {
         Self {
             name: MachineName::default(),
@@ -140,6 +153,9 @@ impl Default for Settings {
             access_point: AccessPointName::default(),
             own_password: None,
             waves: true,
+            map: ZMap::FLAT,
+            shift: NibShift::NONE,
+            directions: Directions::default(),
         }
     }
 }

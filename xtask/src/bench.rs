@@ -89,6 +89,12 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
             peers: vec![("f32 with libm", of("set-point, f32 with libm")?)],
         },
         Row {
+            work: "set-point with map and shift",
+            goal: Goal::Instructions(550),
+            measured: of("set-point, map and shift")?,
+            peers: vec![],
+        },
+        Row {
             work: "set-point of a plan",
             goal: Goal::Instructions(450),
             measured: of("set-point of a plan")?,

@@ -290,7 +290,7 @@ fn serve_clients(
 async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
     house
         .arm
-        .tick(servos, TimedFrames::every(frame), frame)
+        .tick(servos.of(&house.arm), TimedFrames::every(frame), frame)
         .await;
 }
 

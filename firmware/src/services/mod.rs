@@ -51,8 +51,11 @@ pub struct House {
 impl House {
     /// An arm at home, with the settings it remembers.
     pub fn new(data: ArmData, settings: Settings, identity: Identity, vitals: Vitals) -> Self {
+        let mut machine = Machine::new(data, settings.calibration);
+        machine.set_compensation(settings.compensation());
+        machine.set_directions(settings.directions);
         Self {
-            arm: Arm::new(Machine::new(data, settings.calibration)),
+            arm: Arm::new(machine),
             store: Store::new(),
             wifi: Wifi::new(),
             discovery: Discovery::new(),
@@ -133,12 +136,20 @@ impl House {
     }
 
     fn put_in_force(&self, new: Settings) {
-        let calibration = new.calibration;
+        let (calibration, directions) = (new.calibration, new.directions);
+        let (map, shift, compensation) = (new.map, new.shift, new.compensation());
         let old = self.settings.lock(|settings| settings.replace(new));
         self.discovery.renamed();
-        if old.calibration != calibration {
-            self.arm
-                .with(|machine| machine.set_calibration(calibration));
-        }
+        self.arm.with(|machine| {
+            if old.calibration != calibration {
+                machine.set_calibration(calibration);
+            }
+            if (old.map, old.shift) != (map, shift) {
+                machine.set_compensation(compensation);
+            }
+            if old.directions != directions {
+                machine.set_directions(directions);
+            }
+        });
     }
 }

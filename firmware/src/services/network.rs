@@ -110,7 +110,7 @@ impl Wifi {
         self.put(Input::Changed);
     }
 
-    /// Everything has been forgotten.
+    /// Everything has been forgotten: begins anew, a little later.
     pub fn restart(&self) {
         self.put(Input::Restart);
     }
@@ -324,7 +324,11 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
             Input::Press(gesture) => self.on(Event::Press(gesture)),
             Input::Try(network) => self.on(Event::Try(network)),
             Input::Changed => self.on(Event::Changed),
-            Input::Restart => self.on(Event::Restart),
+            Input::Restart => {
+                // The network goes on until the reply to M171 has reached its client.
+                Timer::after(GRACE).await;
+                self.on(Event::Restart);
+            }
             Input::List => {
                 if self.house.wifi.idle.load(Ordering::Relaxed)
                     && self.radio.scan(&mut self.heard).await.is_ok()

@@ -1,8 +1,13 @@
 //! A line becomes a typed command here, once; nothing downstream sees text.
 
+mod fitting;
+
 use super::refusal::Refusal;
-use crate::machine::Manner;
-use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
+use crate::arm::{NibShift, ZMap};
+use crate::machine::{Bare, Manner};
+use crate::motion::{
+    Coordinate, MAX_COORDINATE, MAX_SCALE, Micros, StepRange, StepSize, Transform,
+};
 use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
 use crate::text::{Text, Words};
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Password, Ssid};
@@ -78,6 +83,25 @@ pub enum Command {
     Forget(Ssid),
     /// `M588 S*`.
     ForgetAll,
+    /// G4.
+    Dwell(Micros),
+    /// G31.
+    Compensation,
+    /// `G31 S`, `G31 P`.
+    SetCompensation {
+        /// How high the paper lies.
+        map: Option<ZMap>,
+        /// How the nib moves as it comes down.
+        shift: Option<NibShift>,
+    },
+    /// G40.
+    Uncalibrated(Axes, Bare),
+    /// `M171 Sconfirm`.
+    FactoryReset,
+    /// M280.
+    Directions,
+    /// `M280 S E P`: whether shoulder, elbow and pen turn the other way.
+    SetDirections([Option<bool>; 3]),
 }
 
 /// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
@@ -121,12 +145,18 @@ fn other_than_a_move<'a>(
     line: &'a [u8],
 ) -> Result<Command, Refusal<'a>> {
     match code {
+        (b'G', 4) => fitting::dwell(&mut words),
         (b'G', 28) => without_parameters(&mut words, Command::Home),
+        (b'G', 31) => fitting::compensation(&mut words),
+        (b'G', 40) => fitting::uncalibrated(&mut words),
         (b'G', 54) => transform(&mut words),
         (b'G', 94) => speed(&mut words),
         (b'M', 114) => position(&mut words),
         (b'M', 115) => without_parameters(&mut words, Command::Capabilities),
         (b'M', 122) => without_parameters(&mut words, Command::Diagnostics),
+        (b'M', number @ (170 | 172)) => Err(Refusal::Reserved(number)),
+        (b'M', 171) => fitting::factory_reset(&mut words),
+        (b'M', 280) => fitting::directions(&mut words),
         (b'M', 374) => calibration(&mut words),
         (b'M', 550) => name(&mut words),
         (b'M', 291) => waves(&mut words),
@@ -378,6 +408,7 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
                     | Command::SetWaves(_)
                     | Command::Forget(_)
                     | Command::ForgetAll
+                    | Command::FactoryReset
             ) =>
         {
             Err(Refusal::Repeated(letter))

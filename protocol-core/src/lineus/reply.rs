@@ -1,7 +1,7 @@
 //! What the machine says: one message for each command, built in place, ended as every message is.
 
 use super::refusal::Refusal;
-use crate::arm::{Angles, Calibration};
+use crate::arm::{Angles, Calibration, Compensation, Directions, NibShift, ZMap};
 use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
 use crate::settings::{MachineName, Settings};
@@ -55,6 +55,10 @@ pub struct Diagnostics<'a> {
     pub position: Position,
     /// The servos' offsets.
     pub calibration: Calibration,
+    /// Paper and lift.
+    pub compensation: &'a Compensation,
+    /// Which servos turn the other way.
+    pub directions: Directions,
     /// What the network is doing.
     pub wifi: &'a Status,
     /// How many networks are remembered.
@@ -183,6 +187,17 @@ impl Reply {
         self.compose(format_args!("ok S:{}", if on { 1 } else { 2 }));
     }
 
+    /// How high the paper lies, and how far the nib moves as it comes down.
+    pub fn compensation(&mut self, map: ZMap, shift: NibShift) {
+        self.compose(format_args!("ok S:{map} P:{shift}"));
+    }
+
+    /// Which servos turn the other way.
+    pub fn directions(&mut self, directions: Directions) {
+        let [shoulder, elbow, pen] = numbers(directions);
+        self.compose(format_args!("ok S:{shoulder} E:{elbow} P:{pen}"));
+    }
+
     /// Networks: those that are heard, in the order given, which is by strength, each with 1 where it is
     /// remembered and 2 where it is not; then those that are remembered and not heard, with 3
     /// (`spec 1.0.4a, M587`). Where not all fit, the last ones that are not remembered are left out.
@@ -241,10 +256,12 @@ impl Reply {
         let [a, b, c, d, e, f] = state.identity.mac;
         let Position { x, y, z } = state.position;
         let [shoulder, elbow, pen] = state.calibration.offsets.to_array().map(Degrees);
+        let [turn_s, turn_e, turn_p] = numbers(state.directions);
+        let (map, shift) = (state.compensation.map(), state.compensation.shift());
         self.compose(format_args!(
             "ok name:{}{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
-             WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
+             ZMap:{map} NibShift:{shift} Servos:{turn_s},{turn_e},{turn_p} WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
              Memory:\"{}\"{}",
             state.name.as_str(),
             Host(state.host),
@@ -335,6 +352,11 @@ fn tell(limited: Limited) -> &'static str {
         Limited::Target { lifted: false } => "out of reach: going to the closest point",
         Limited::Way => "the way leaves the drawing area: held at its edge",
     }
+}
+
+/// As behind the letters of M280.
+fn numbers(directions: Directions) -> [u8; 3] {
+    directions.reversed.map(|reversed| 1 + u8::from(reversed))
 }
 
 const fn mode(own_network: bool) -> &'static str {
@@ -488,6 +510,20 @@ mod tests {
     }
 
     #[test]
+    fn paper_lift_and_directions() {
+        let map = ZMap::new([0, 100, 300, -200]).unwrap();
+        let shift = NibShift::from_hundredths(-85).unwrap();
+        assert_eq!(
+            said(|reply| reply.compensation(map, shift)),
+            "ok S:0;100;300;-200 P:-0.85"
+        );
+        let directions = Directions {
+            reversed: [false, true, false],
+        };
+        assert_eq!(said(|reply| reply.directions(directions)), "ok S:1 E:2 P:1");
+    }
+
+    #[test]
     fn ok_has_its_blank() {
         assert_eq!(said(Reply::ok), "ok ");
     }
@@ -633,6 +669,13 @@ mod tests {
                 position: Position::from_units(-1950, -1950, 1000),
                 calibration: Calibration {
                     offsets: Angles::from_array([i32::MIN; 3].map(Microdegrees::new)),
+                },
+                compensation: &Compensation::new(
+                    ZMap::new([-500; 4]).unwrap(),
+                    NibShift::from_hundredths(-200).unwrap(),
+                ),
+                directions: Directions {
+                    reversed: [true; 3],
                 },
                 wifi: &Status {
                     setup: true,

@@ -1,6 +1,6 @@
 //! What a board says about its arm, and what the arm tells the board.
 
-use crate::arm::{Angles, PenLift, Pulses, ServoRange, forward};
+use crate::arm::{Angles, Compensation, PenLift, Pulses, ServoRange, bare_forward, forward};
 use crate::motion::{Microdegrees, Micros, Outputs, PlanData, Position};
 
 /// What a board says about its arm.
@@ -49,9 +49,21 @@ pub struct SetPoint {
 /// Where the nib of an arm without offsets is when its servos are given `pulses`: forward kinematics,
 /// for pictures of what the arm did.
 pub fn position_of(pulses: Pulses, data: &ArmData) -> Position {
+    forward(angles_of(pulses, data), data.lift)
+}
+
+/// The same for an arm whose paper lies and whose nib moves as `compensation` says.
+pub fn nib_of(pulses: Pulses, data: &ArmData, compensation: &Compensation) -> Position {
+    if compensation.is_none() {
+        return position_of(pulses, data);
+    }
+    compensation.nib(bare_forward(angles_of(pulses, data), data.lift))
+}
+
+fn angles_of(pulses: Pulses, data: &ArmData) -> Angles {
     let mut angles = [Microdegrees::default(); 3];
     for ((angle, servo), pulse) in angles.iter_mut().zip(&data.servos).zip(pulses) {
         *angle = servo.angle(pulse);
     }
-    forward(Angles::from_array(angles), data.lift)
+    Angles::from_array(angles)
 }

@@ -2,7 +2,7 @@
 
 #[cfg(doc)]
 use super::Machine;
-use crate::motion::{HOME, Position, WideCoordinate};
+use crate::motion::{HOME, Micros, Position, WideCoordinate};
 
 /// Clients that may be connected at once; the next one is told so and closed.
 pub const MAX_CLIENTS: usize = 4;
@@ -69,11 +69,25 @@ pub enum Manner {
     Rapid,
 }
 
+/// Which axes of a move are the arm's own: without calibration, map and shift (`reference/line-us.md`,
+/// section 5, G40).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bare {
+    /// X and Y; they belong together, because each moves both servos.
+    pub xy: bool,
+    /// Z.
+    pub z: bool,
+}
+
 /// What a client asks of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Errand {
     /// Go somewhere.
     Move(Manner, Target),
+    /// Go where the servos of an arm without offsets would put the nib, in a straight line (G40).
+    Uncalibrated(Target, Bare),
+    /// Stay where it is for this long (G4), at most [`MOST_DWELL`](crate::motion::MOST_DWELL).
+    Dwell(Micros),
     /// Make a little wave and be back: nothing happens while the pen is down.
     Wave,
     /// Come to rest and stay there until [`Machine::release`]: for what must not be done in motion.

@@ -7,6 +7,8 @@ pub(super) enum Motion {
     Line(Line),
     Rapid(Rapid),
     Wave(Wave),
+    /// Staying at a place for a time.
+    Dwell(Position, Micros),
 }
 
 impl Motion {
@@ -15,6 +17,7 @@ impl Motion {
             Self::Line(line) => line.duration(),
             Self::Rapid(rapid) => rapid.duration(),
             Self::Wave(_) => Wave::DURATION,
+            Self::Dwell(_, duration) => *duration,
         }
     }
 
@@ -23,6 +26,7 @@ impl Motion {
             Self::Line(line) => line.end(),
             Self::Rapid(rapid) => rapid.end(),
             Self::Wave(wave) => wave.end(),
+            Self::Dwell(place, _) => *place,
         }
     }
 
@@ -31,7 +35,7 @@ impl Motion {
             Self::Line(line) => line.leaves_the_area(),
             Self::Rapid(rapid) => rapid.leaves_the_area(),
             // Held at the edge where it would.
-            Self::Wave(_) => false,
+            Self::Wave(_) | Self::Dwell(..) => false,
         }
     }
 
@@ -41,6 +45,7 @@ impl Motion {
             Self::Line(line) => line.at(elapsed),
             Self::Rapid(rapid) => rapid.at(elapsed),
             Self::Wave(wave) => wave.at(elapsed),
+            Self::Dwell(place, _) => (*place, false),
         }
     }
 }

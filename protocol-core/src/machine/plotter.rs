@@ -185,12 +185,12 @@ impl Machine {
         self.plan.halt(position, now);
         let reports = &mut self.reports;
         self.waiting.retain(|turn| match turn {
-            Turn::Errand(client, Errand::Move(..) | Errand::Wave) => {
+            Turn::Errand(_, Errand::Rest) => true,
+            Turn::Errand(client, _) => {
                 // A client has one errand at a time, so one report at a time as well.
                 let _ = reports.push_back((*client, Report::Stopped));
                 false
             }
-            Turn::Errand(_, Errand::Rest) => true,
             Turn::Plan => false,
         });
     }

@@ -11,6 +11,9 @@
 //! | 5 | how its own network is called: 1 or 2, as `M552 P` |
 //! | 6 | waves: 0 or 1 |
 //! | 7 | password of its own network; no field where that is open |
+//! | 24 | map of heights: top left, top right, bottom right, bottom left, little-endian units of Z |
+//! | 25 | how far the nib moves as it comes down: little-endian hundredths of a millimetre |
+//! | 26 | servos that turn the other way: a bit for shoulder, elbow and pen |
 //!
 //! How it may change: a new setting gets a new tag. Firmware that does not know the tag skips it, and
 //! where a field is missing, because the record is older than the setting, the setting has its default.
@@ -19,7 +22,7 @@
 //! firmware takes those of all earlier ones. Version 1 was not a record yet: `parts.rs` reads it.
 
 use super::{AccessPointName, MAX_NAME, MachineName, Settings, StartMode};
-use crate::arm::Calibration;
+use crate::arm::{Calibration, Directions, NibShift, ZMap};
 use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, MAX_PASSWORD, Network, Password};
 use heapless::Vec;
 
@@ -33,6 +36,9 @@ const START: u8 = 4;
 const ACCESS_POINT: u8 = 5;
 const WAVES: u8 = 6;
 const OWN_PASSWORD: u8 = 7;
+const MAP: u8 = 24;
+const SHIFT: u8 = 25;
+const DIRECTIONS: u8 = 26;
 
 /// Tag and length.
 const HEAD: usize = 2;
@@ -42,7 +48,10 @@ pub const MAX_RECORD: usize = 1
     + (HEAD + Calibration::BYTES)
     + MAX_NETWORKS * (HEAD + MAX_NETWORK)
     + 3 * (HEAD + 1)
-    + (HEAD + MAX_PASSWORD);
+    + (HEAD + MAX_PASSWORD)
+    + (HEAD + ZMap::BYTES)
+    + (HEAD + 2)
+    + (HEAD + 1);
 
 // Lengths are one byte.
 const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255);
@@ -64,6 +73,9 @@ impl Settings {
         if let Some(password) = &self.own_password {
             put(&mut record, OWN_PASSWORD, password.as_bytes());
         }
+        put(&mut record, MAP, &self.map.to_bytes());
+        put(&mut record, SHIFT, &self.shift.hundredths().to_le_bytes());
+        put(&mut record, DIRECTIONS, &[self.directions.to_byte()]);
         record
     }
 
@@ -97,6 +109,12 @@ impl Settings {
             (ACCESS_POINT, &[number]) => self.access_point = AccessPointName::from_number(number)?,
             (WAVES, &[flag @ (0 | 1)]) => self.waves = flag == 1,
             (OWN_PASSWORD, phrase) => self.own_password = Some(Password::new(phrase)?),
+            (MAP, bytes) => self.map = ZMap::from_bytes(bytes.try_into().ok()?)?,
+            (SHIFT, bytes) => {
+                let hundredths = i16::from_le_bytes(bytes.try_into().ok()?);
+                self.shift = NibShift::from_hundredths(hundredths)?;
+            }
+            (DIRECTIONS, &[bits]) => self.directions = Directions::from_byte(bits)?,
             _ => return None,
         }
         Some(())

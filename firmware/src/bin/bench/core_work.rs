@@ -3,11 +3,12 @@
 use crate::measure;
 use core::cell::RefCell;
 use core::hint::black_box;
-use protocol_core::arm::{Angles, PenLift, inverse};
+use protocol_core::arm::{Angles, Compensation, NibShift, PenLift, ZMap, inverse};
 use protocol_core::lineus::{Command, Refusal, parse};
 use protocol_core::machine::{ArmData, Client, Errand, Machine, Manner, SetPoint, Target};
 use protocol_core::motion::{
-    Coordinate, Feed, Intensity, Micros, Millimetres, PLAN_SEGMENTS, Position, Segment, TablePoint,
+    Coordinate, Feed, Intensity, Micros, Millimetres, PEN_DOWN, PLAN_SEGMENTS, Position, Segment,
+    TablePoint,
 };
 
 /// The points of the other measurements, in 1/65536 units.
@@ -31,14 +32,20 @@ const fn point(x: i32, y: i32, z: i32) -> Position {
 pub fn report() {
     measure::report("parse", &[&b"G01 X1234 Y-567 Z1000"[..]], parsed);
     measure::report("inverse kinematics", &POINTS, angles);
-    let moves = POINTS.map(|to| {
-        let mut machine = Machine::new(ArmData::default(), Default::default());
-        machine.tick(Micros::default());
-        let client = Client::new(0).expect("there is a first client");
-        machine.take(client, &Errand::Move(Manner::Straight, Target::at(to)));
-        RefCell::new((machine, Micros::new(50_000)))
-    });
-    measure::report("set-point", &moves, set_point);
+    let usual = Compensation::default();
+    measure::report("set-point", &moves(POINTS, usual), set_point);
+    // With the pen up there is nothing to compensate.
+    let down = POINTS.map(|to| Position { z: PEN_DOWN, ..to });
+    let map = ZMap::new([0, 100, 300, 200]).expect("heights in range");
+    let shift = NibShift::from_hundredths(85).expect("a shift in range");
+    for (name, map, shift) in [
+        ("set-point, pen on its way down", ZMap::FLAT, NibShift::NONE),
+        ("set-point, map", map, NibShift::NONE),
+        ("set-point, map and shift", map, shift),
+    ] {
+        let compensation = Compensation::new(map, shift);
+        measure::report(name, &moves(down, compensation), set_point);
+    }
     measure::report(
         "set-point of a plan",
         &STROKE_MILLIS.map(in_a_stroke),
@@ -50,6 +57,18 @@ pub fn report() {
         set_point,
     );
     measure::report("plan a segment", &[full_but_one()], plan_one_more);
+}
+
+/// Arms on their way from home, and the time of the next frame.
+fn moves(targets: [Position; 5], compensation: Compensation) -> [RefCell<(Machine, Micros)>; 5] {
+    targets.map(|to| {
+        let mut machine = Machine::new(ArmData::default(), Default::default());
+        machine.set_compensation(compensation);
+        machine.tick(Micros::default());
+        let client = Client::new(0).expect("there is a first client");
+        machine.take(client, &Errand::Move(Manner::Straight, Target::at(to)));
+        RefCell::new((machine, Micros::new(50_000)))
+    })
 }
 
 /// In the rise, the cruise and the fall of a stroke of 700 ms.

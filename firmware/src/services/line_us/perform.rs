@@ -70,15 +70,47 @@ pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client
             change("networks", forget, reply, client, house).await;
             house.wifi.changed();
         }
+        Request::Compensation => {
+            house.settings(|settings| reply.compensation(settings.map, settings.shift));
+        }
+        Request::SetCompensation { map, shift } => {
+            let set = |settings: &mut Settings| {
+                settings.map = map.unwrap_or(settings.map);
+                settings.shift = shift.unwrap_or(settings.shift);
+                Ok(())
+            };
+            change("map", set, reply, client, house).await;
+        }
+        Request::Directions => reply.directions(house.settings(|settings| settings.directions)),
+        Request::SetDirections(servos) => {
+            let set = |settings: &mut Settings| {
+                let now = settings.directions.reversed;
+                let pairs = servos.iter().zip(now);
+                let mut new = pairs.map(|(new, now)| new.unwrap_or(now));
+                settings.directions.reversed = now.map(|now| new.next().unwrap_or(now));
+                Ok(())
+            };
+            change("direction", set, reply, client, house).await;
+        }
+        Request::FactoryReset => match house.forget_everything().await {
+            Ok(()) => reply.ok(),
+            Err(error) => refuse_store("factory reset", &error, reply),
+        },
         Request::Calibrate => calibrate(true, reply, client, house).await,
         Request::ClearCalibration => calibrate(false, reply, client, house).await,
     }
 }
 
 fn diagnose(reply: &mut Reply, house: &House) {
-    let (position, calibration) = house
-        .arm
-        .with(|machine| (machine.position(), machine.calibration()));
+    let (position, calibration, compensation, directions) = house.arm.with(|machine| {
+        let compensation = *machine.compensation();
+        (
+            machine.position(),
+            machine.calibration(),
+            compensation,
+            machine.directions(),
+        )
+    });
     reply.diagnostics(&Diagnostics {
         name: &house.name(),
         host: house.discovery.host().as_deref(),
@@ -86,6 +118,8 @@ fn diagnose(reply: &mut Reply, house: &House) {
         uptime: Micros::new(house.uptime().as_micros()),
         position,
         calibration,
+        compensation: &compensation,
+        directions,
         wifi: &house.wifi.status(),
         networks: house.settings(|settings| settings.networks.len()),
         free_memory: (house.vitals.free_memory)(),

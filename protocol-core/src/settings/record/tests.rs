@@ -4,7 +4,7 @@ use super::*;
 use crate::arm::Angles;
 use crate::motion::Microdegrees;
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Networks, Password, Ssid};
-use proptest::array::uniform3;
+use proptest::array::{uniform3, uniform4};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -30,24 +30,36 @@ fn networks() -> impl Strategy<Value = Networks> {
 
 fn settings() -> impl Strategy<Value = Settings> {
     let numbers = (1..=4u8, 1..=2u8, any::<bool>());
+    let fitting = (uniform4(-500..=500i16), -200..=200i16, 0..8u8);
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
-        option::of(vec(any::<u8>(), 8..=63)),
+        (option::of(vec(any::<u8>(), 8..=63)), fitting),
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves), own)| Settings {
-                name: MachineName::new(&name).unwrap(),
-                calibration: Calibration {
-                    offsets: Angles::from_array(offsets.map(Microdegrees::new)),
-                },
+            |(
+                name,
+                offsets,
                 networks,
-                start: StartMode::from_number(start).unwrap(),
-                access_point: AccessPointName::from_number(access_point).unwrap(),
-                own_password: own.map(|phrase| Password::new(&phrase).unwrap()),
-                waves,
+                (start, access_point, waves),
+                (own, (map, shift, servos)),
+            )| {
+                Settings {
+                    name: MachineName::new(&name).unwrap(),
+                    calibration: Calibration {
+                        offsets: Angles::from_array(offsets.map(Microdegrees::new)),
+                    },
+                    networks,
+                    start: StartMode::from_number(start).unwrap(),
+                    access_point: AccessPointName::from_number(access_point).unwrap(),
+                    own_password: own.map(|phrase| Password::new(&phrase).unwrap()),
+                    waves,
+                    map: ZMap::new(map).unwrap(),
+                    shift: NibShift::from_hundredths(shift).unwrap(),
+                    directions: Directions::from_byte(servos).unwrap(),
+                }
             },
         )
 }
@@ -99,7 +111,7 @@ proptest! {
     #[test]
     fn tags_of_later_firmware_are_skipped(
         settings in settings(),
-        tag in 8..=255u8,
+        tag in 100..=255u8,
         value in vec(any::<u8>(), 0..=255),
         place: prop::sample::Index,
     ) {
@@ -138,7 +150,10 @@ fn the_bytes_of_a_record() {
         \x04\x01\x04\
         \x05\x01\x02\
         \x06\x01\x00\
-        \x07\x08\x00\xffsecret";
+        \x07\x08\x00\xffsecret\
+        \x18\x08\0\0\x64\0\x2c\x01\x38\xff\
+        \x19\x02\xab\xff\
+        \x1a\x01\x02";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -155,6 +170,9 @@ fn the_bytes_of_a_record() {
     assert!(!settings.waves);
     let password = settings.own_password.as_ref().unwrap();
     assert_eq!(password.as_bytes(), b"\x00\xffsecret");
+    assert_eq!(settings.map.corners(), [0, 100, 300, -200]);
+    assert_eq!(settings.shift.hundredths(), -85);
+    assert_eq!(settings.directions.reversed, [false, true, false]);
 }
 
 #[test]
@@ -208,6 +226,11 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x06\x00",
         b"\x07\x00",
         b"\x07\x07seven..",
+        b"\x18\x07\0\0\0\0\0\0\0",
+        b"\x18\x08\0\0\0\0\0\0\xf5\x01",
+        b"\x19\x02\xc9\x00",
+        b"\x19\x01\x00",
+        b"\x1a\x01\x08",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(
