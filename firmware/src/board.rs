@@ -4,6 +4,7 @@
 //! embedded-hal-async's `Wait`. Time: an embassy-time driver. The rest is here.
 
 use heapless::Vec;
+use protocol_core::lasaur::Sensors;
 use protocol_core::machine::SetPoint;
 use protocol_core::motion::Micros;
 pub use protocol_core::panel::Colour;
@@ -92,6 +93,34 @@ pub trait Address {
     /// Takes 192.168.4.1, the address of the machine on its own network, and gives its guests
     /// addresses, for ever.
     async fn serve_guests(&self) -> !;
+}
+
+/// What a plotter's controller senses: door, chiller, power, limit switches. An input that a board does
+/// not have is never set.
+#[expect(
+    async_fn_in_trait,
+    reason = "awaited in place by the serial service alone, so no bound is missing"
+)]
+pub trait Inputs {
+    /// The inputs now; must not wait.
+    fn sense(&self) -> Sensors;
+
+    /// Waits until one of them has changed. May be dropped and called again at any time.
+    async fn changed(&mut self);
+}
+
+/// A board without inputs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoInputs;
+
+impl Inputs for NoInputs {
+    fn sense(&self) -> Sensors {
+        Sensors::default()
+    }
+
+    async fn changed(&mut self) {
+        core::future::pending::<()>().await;
+    }
 }
 
 /// What a board knows about itself, for diagnostics.

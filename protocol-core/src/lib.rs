@@ -14,6 +14,7 @@
 
 pub mod arm;
 pub mod drawings;
+pub mod lasaur;
 pub mod lineus;
 pub mod machine;
 pub mod motion;

@@ -13,6 +13,7 @@ use std::process::{Command, ExitCode};
 use xtask::bench;
 use xtask::board::{Board, run};
 use xtask::emulator::QEMU;
+use xtask::ready::Owner;
 use xtask::toolchain::require;
 
 /// Build, emulate, flash, measure and test the firmware.
@@ -44,11 +45,18 @@ enum Task {
         /// The serial port; found by itself where there is only one
         #[arg(long)]
         port: Option<String>,
+        #[command(flatten)]
+        owner: Owner,
     },
     /// Build, and make one file to write at the beginning of a chip's flash
+    ///
+    /// With a network or a name, the arm has these when it first starts, and what it remembered before is
+    /// gone. For virt it makes a file for `emulate --flash`.
     Image {
         /// The board
         board: Board,
+        #[command(flatten)]
+        owner: Owner,
     },
     /// Tell how much flash and memory the firmware takes on each chip, and how much of that a bare
     /// program takes that joins WiFi and echoes TCP
@@ -68,6 +76,9 @@ struct Emulate {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
+    /// Where laser software connects to the serial line, over TCP
+    #[arg(long, value_name = "ADDR")]
+    serial_tcp: Option<SocketAddr>,
     /// The machine's flash, kept between runs; made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.flash")]
     flash: PathBuf,
@@ -100,9 +111,9 @@ fn perform(cli: Cli) -> Result<()> {
             require(QEMU.0, QEMU.1, setup)?;
             emulate::emulate(options, setup)
         }
-        Task::Flash { board, port } => flash(board, port.as_deref(), setup),
-        Task::Image { board } => {
-            println!("{}", image::image(board, setup)?.display());
+        Task::Flash { board, port, owner } => flash(board, port.as_deref(), &owner, setup),
+        Task::Image { board, owner } => {
+            println!("{}", image::image(board, &owner, setup)?.display());
             Ok(())
         }
         Task::Size => table::sizes(setup),
@@ -115,7 +126,7 @@ fn perform(cli: Cli) -> Result<()> {
     }
 }
 
-fn flash(board: Board, port: Option<&str>, setup: bool) -> Result<()> {
+fn flash(board: Board, port: Option<&str>, owner: &Owner, setup: bool) -> Result<()> {
     if !board.is_chip() {
         bail!("{} is not a chip", board.name());
     }
@@ -127,7 +138,7 @@ fn flash(board: Board, port: Option<&str>, setup: bool) -> Result<()> {
         }
         run(Command::new("cargo").args(["install", "espflash", "--locked"]))?;
     }
-    let image = image::image(board, setup)?;
+    let image = image::image(board, owner, setup)?;
     let mut espflash = Command::new("espflash");
     espflash.args(["write-bin", "--chip", board.name()]);
     if let Some(port) = port {

@@ -44,13 +44,12 @@ pub fn bench(rows: &[Row], csv: bool) {
     if csv {
         println!("work,goal,measured,peer,peer_measured");
         for row in rows {
+            let own = format!("{},{},{}", row.work, row.most(), row.measured);
             for (peer, count) in &row.peers {
-                println!(
-                    "{},{},{},{peer},{count}",
-                    row.work,
-                    row.most(),
-                    row.measured
-                );
+                println!("{own},{peer},{count}");
+            }
+            if row.peers.is_empty() {
+                println!("{own},,");
             }
         }
         return;

@@ -6,6 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 use xtask::board::{Board, own_cargo, root, run};
 use xtask::emulator::QEMU;
+use xtask::ready::Owner;
 use xtask::toolchain::require;
 
 /// Runs all checks, the quick ones first, up to the first that fails.
@@ -61,7 +62,10 @@ pub fn everything(setup: bool) -> Result<()> {
     })?;
     for board in Board::CHIPS {
         step(&format!("image for {}", board.name()), || {
-            println!("{}", crate::image::image(board, setup)?.display());
+            println!(
+                "{}",
+                crate::image::image(board, &Owner::default(), setup)?.display()
+            );
             Ok(())
         })?;
     }
@@ -87,19 +91,22 @@ fn fuzz() -> Result<()> {
         println!("skipped: cargo install cargo-fuzz --locked");
         return Ok(());
     }
-    let mut fuzz = Command::new("cargo");
-    for variable in ["CARGO", "RUSTUP_TOOLCHAIN"] {
-        fuzz.env_remove(variable);
+    for target in ["session", "lasaur"] {
+        let mut fuzz = Command::new("cargo");
+        for variable in ["CARGO", "RUSTUP_TOOLCHAIN"] {
+            fuzz.env_remove(variable);
+        }
+        fuzz.current_dir(root().join("host-tests")).args([
+            "+nightly",
+            "fuzz",
+            "run",
+            target,
+            "--",
+            "-max_total_time=20",
+        ]);
+        run(&mut fuzz)?;
     }
-    fuzz.current_dir(root().join("host-tests")).args([
-        "+nightly",
-        "fuzz",
-        "run",
-        "session",
-        "--",
-        "-max_total_time=20",
-    ]);
-    run(&mut fuzz)
+    Ok(())
 }
 
 fn step(name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {

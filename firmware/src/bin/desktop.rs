@@ -1,25 +1,31 @@
 //! The desktop arm: the firmware of the drawing arm with sockets, files and a picture.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use core::net::SocketAddr;
+use edge_nal::TcpAccept;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Timer};
+use firmware::board::NoInputs;
 use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
+use firmware::boards::desktop::draw_lasaur::{self, Listener as Replies, Sender};
 use firmware::boards::desktop::flash::{self, FileFlash};
-use firmware::boards::desktop::net::Listener;
+use firmware::boards::desktop::net::{Listener, Multicast};
+use firmware::boards::desktop::pty::{self, Pty};
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
 use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS, own_network};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::discovery::{self, Ports};
 use firmware::services::drawings::Album;
 use firmware::services::line_us::{Server, serve};
+use firmware::services::serial::{self, ReadError};
 use firmware::services::storage::Memory;
 use firmware::services::{drawer, network};
 use indicatif::{ProgressBar, ProgressStyle};
-use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
+use protocol_core::machine::{ArmData, Client, MAX_CLIENTS, StopReason};
 use protocol_core::motion::Micros;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -54,6 +60,18 @@ struct Serve {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
+    /// A serial port for laser software, made there and removed in the end
+    #[arg(long, value_name = "PATH", conflicts_with = "serial_tcp")]
+    serial: Option<PathBuf>,
+    /// The serial port over TCP instead
+    #[arg(long, value_name = "ADDR")]
+    serial_tcp: Option<SocketAddr>,
+    /// Announce the arm by name, so that clients find it without an address
+    ///
+    /// On the network of the address where clients connect: on this computer alone, unless that is another
+    /// one.
+    #[arg(long)]
+    mdns: bool,
     /// Where the arm keeps its name, calibration and network, made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.state")]
     state: PathBuf,
@@ -77,11 +95,22 @@ struct Serve {
 struct Draw {
     /// G-code, a command a line
     file: PathBuf,
+    /// What language the file is in
+    #[arg(long, value_enum, default_value_t = Dialect::LineUs)]
+    dialect: Dialect,
     /// A picture of what the servos did, SVG or PNG
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Dialect {
+    /// Line-us G-code, in drawing units
+    LineUs,
+    /// LasaurGrbl's, in millimetres on the table
+    Lasaur,
 }
 
 #[derive(Args)]
@@ -122,9 +151,6 @@ fn main() -> ExitCode {
 /// Serves until the program is told to stop.
 fn run_arm(options: Serve) -> io::Result<ExitCode> {
     static STOP: AtomicBool = AtomicBool::new(false);
-    let named = |what: &dyn std::fmt::Display, error: io::Error| {
-        io::Error::new(error.kind(), format!("{what}: {error}"))
-    };
     let listener = embassy_futures::block_on(Listener::bind(options.line_us))
         .map_err(|error| named(&options.line_us, error))?;
     let listener: &'static Listener = Box::leak(Box::new(listener));
@@ -135,6 +161,12 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let drawings = options.drawings.clone();
     let drawings = drawings.unwrap_or_else(|| options.state.with_extension("drawings"));
     let drawings = open(&drawings, flash::DRAWINGS_SIZE)?;
+    let (port, _link) = serial_port(&options)?;
+    let multicast = options
+        .mdns
+        .then(|| Multicast::beside(options.line_us.ip()))
+        .transpose()
+        .map_err(|error| named(&"--mdns", error))?;
     let data = ArmData {
         lift_after: Micros::from_secs(options.lift_after),
         ..ArmData::default()
@@ -151,17 +183,88 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
 
     log::info!("{} is ready.", house.name().as_str());
     log::info!("  Line-us clients: {}", options.line_us);
+    if let Some(path) = &options.serial {
+        log::info!("  serial port:     {}", path.display());
+    }
+    if let Some(address) = &options.serial_tcp {
+        log::info!("  serial port:     {address} (TCP)");
+    }
     log::info!("  picture:         {}", options.picture.display());
     log::info!("  stop with Ctrl-C");
     let mut spawned = Ok(());
     clock::run(
         options.speed,
-        |spawner| spawned = serve_clients(spawner, house, (memory, album), servos, frame, listener),
+        |spawner| {
+            spawned = serve_clients(spawner, house, (memory, album), servos, frame, listener)
+                .and_then(|()| serve_port(spawner, port, house))
+                .and_then(|()| {
+                    if let Some(multicast) = multicast {
+                        spawner.spawn(discovery(house, multicast, options.line_us.port())?);
+                    }
+                    Ok(())
+                });
+        },
         || STOP.load(Ordering::Relaxed),
     );
     spawned.map_err(io::Error::other)?;
     recorder.finish()?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn named(what: &dyn std::fmt::Display, error: io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{what}: {error}"))
+}
+
+/// Where the serial port leads.
+enum Port {
+    None,
+    Terminal(Pty),
+    Tcp(Listener),
+}
+
+fn serial_port(options: &Serve) -> io::Result<(Port, Option<pty::Link>)> {
+    if let Some(path) = &options.serial {
+        let opened = pty::open(path).map_err(|error| named(&path.display(), error));
+        return opened.map(|(pty, link)| (Port::Terminal(pty), Some(link)));
+    }
+    let Some(address) = options.serial_tcp else {
+        return Ok((Port::None, None));
+    };
+    let bound = embassy_futures::block_on(Listener::bind(address));
+    let listener = bound.map_err(|error| named(&address, error))?;
+    Ok((Port::Tcp(listener), None))
+}
+
+fn serve_port(spawner: Spawner, port: Port, house: &'static House) -> Result<(), SpawnError> {
+    match port {
+        Port::None => {}
+        Port::Terminal(pty) => spawner.spawn(terminal(pty, house)?),
+        Port::Tcp(listener) => spawner.spawn(serial_tcp(listener, house)?),
+    }
+    return Ok(());
+
+    #[embassy_executor::task]
+    async fn terminal(pty: Pty, house: &'static House) {
+        loop {
+            pty.opened().await;
+            log::info!("serial port opened");
+            serial::serve(&pty, &pty, ReadError::Ended, &mut NoInputs, house).await;
+            log::info!("serial port closed");
+        }
+    }
+
+    #[embassy_executor::task]
+    async fn serial_tcp(listener: Listener, house: &'static House) {
+        loop {
+            let Ok((peer, socket)) = listener.accept().await else {
+                Timer::after_millis(10).await;
+                continue;
+            };
+            log::info!("serial port opened by {peer}");
+            serial::serve(&socket, &socket, ReadError::Ended, &mut NoInputs, house).await;
+            log::info!("serial port closed by {peer}");
+        }
+    }
 }
 
 fn serve_clients(
@@ -199,7 +302,7 @@ fn serve_clients(
 async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
     house
         .arm
-        .tick(servos, TimedFrames::every(frame), frame)
+        .tick(servos.of(&house.arm), TimedFrames::every(frame), frame)
         .await;
 }
 
@@ -215,6 +318,12 @@ async fn wifi(house: &'static House) {
     });
     let radio = ScriptedRadio::new(&AIR);
     network::run(house, radio, NoAddress).await;
+}
+
+#[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast, line_us: u16) {
+    let ports = Ports { line_us, web: None };
+    discovery::run(house, &multicast, || Some(multicast.address()), ports).await;
 }
 
 #[embassy_executor::task]
@@ -253,6 +362,12 @@ fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<
     Ok((Box::leak(Box::new(house)), memory))
 }
 
+/// A file that speaks to the arm.
+enum Host {
+    LineUs(Script),
+    Lasaur(Sender, Replies),
+}
+
 /// Draws one file in virtual time.
 fn draw_file(options: Draw) -> io::Result<ExitCode> {
     static FINISHED: AtomicBool = AtomicBool::new(false);
@@ -260,9 +375,18 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     let style = ProgressStyle::with_template("{bar:40} {percent}% of {bytes_total}, {eta} left");
     bar.set_style(style.map_err(io::Error::other)?);
     let path = &options.file;
-    let script = draw::open(path, bar.clone());
-    let (script, outcome) = script
-        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
+    let named = |error: io::Error| named(&path.display(), error);
+    let (host, outcome): (_, Box<dyn Fn() -> Outcome>) = match options.dialect {
+        Dialect::LineUs => {
+            let (script, outcome) = draw::open(path, bar.clone()).map_err(named)?;
+            (Host::LineUs(script), Box::new(move || *outcome.borrow()))
+        }
+        Dialect::Lasaur => {
+            let (sender, replies) = draw_lasaur::open(path, bar.clone()).map_err(named)?;
+            let outcome = sender.outcome();
+            (Host::Lasaur(sender, replies), Box::new(outcome))
+        }
+    };
     let data = ArmData::default();
     let outputs = Outputs {
         trace: options.common.trace.clone(),
@@ -280,7 +404,7 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
         spawner.spawn(arm(house, servos, frame)?);
         spawner.spawn(storage(house, memory)?);
         spawner.spawn(drawings(house, album)?);
-        spawner.spawn(client(script, house)?);
+        spawner.spawn(client(host, house)?);
         Ok::<_, SpawnError>(())
     };
     clock::run(
@@ -291,19 +415,27 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     spawned.map_err(io::Error::other)?;
     let totals = recorder.finish()?;
     bar.finish_and_clear();
-    let outcome = *outcome.borrow();
+    let outcome = outcome();
     // Nobody has to listen.
     let _ = tell(&outcome, &totals);
-    return Ok(if outcome.is_clean() {
+    let stopped = house.arm.with(|machine| machine.stopped());
+    if let Some(StopReason::Limit(side)) = stopped {
+        eprintln!("the arm was stopped at the edge of the table, {side:?}");
+    }
+    return Ok(if outcome.is_clean() && stopped.is_none() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
     });
 
     #[embassy_executor::task]
-    async fn client(script: Script, house: &'static House) {
-        if let Some(client) = Client::new(0) {
-            serve(script, client, house).await;
+    async fn client(host: Host, house: &'static House) {
+        match (host, Client::new(0)) {
+            (Host::LineUs(script), Some(client)) => serve(script, client, house).await,
+            (Host::LineUs(_), None) => {}
+            (Host::Lasaur(sender, replies), _) => {
+                serial::serve(sender, replies, ReadError::Ended, &mut NoInputs, house).await;
+            }
         }
         while house.arm.with(|machine| machine.is_busy()) {
             Timer::after_millis(1).await;

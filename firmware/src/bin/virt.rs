@@ -12,10 +12,13 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::{Duration, Timer};
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
+use firmware::boards::embassy_udp::Multicast;
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::boards::virt::flash::Flash;
 use firmware::boards::virt::net::VirtNet;
+use firmware::boards::virt::uart::{Receiver, Transmitter};
 use firmware::boards::virt::world::button::Button;
+use firmware::boards::virt::world::inputs::Inputs;
 use firmware::boards::virt::world::light::Light;
 use firmware::boards::virt::world::servos::Servos;
 use firmware::boards::virt::world::{Lines, Recorder};
@@ -23,8 +26,10 @@ use firmware::boards::virt::{self, Wired, executor};
 use firmware::boards::{DRAWINGS, SETTINGS};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::discovery::{self, Ports};
 use firmware::services::drawings::Album;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
+use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
 use firmware::services::{drawer, network, panel};
 use protocol_core::lineus::Identity;
@@ -40,6 +45,7 @@ const BUFFER: usize = 2048;
 /// The disk, which settings and drawings share.
 type Disk = Mutex<NoopRawMutex, Flash>;
 type Part = Partition<'static, NoopRawMutex, Flash>;
+type SerialPort = (Receiver, Transmitter);
 type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
 
 /// Never returns.
@@ -52,7 +58,8 @@ fn main() -> ! {
         let started = devices.and_then(|devices| {
             spawner.spawn(records(devices.recorder).ok()?);
             spawner.spawn(host_lines(devices.lines).ok()?);
-            spawner.spawn(boot(spawner, tick, devices.card, devices.disk).ok()?);
+            let (card, disk, serial) = (devices.card, devices.disk, devices.serial);
+            spawner.spawn(boot(spawner, tick, card, disk, serial).ok()?);
             Some(())
         });
         if started.is_none() {
@@ -64,16 +71,26 @@ fn main() -> ! {
 
 /// Reads the settings, then starts everything else.
 #[embassy_executor::task]
-async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtNet, disk: Flash) {
+async fn boot(
+    spawner: Spawner,
+    tick: embassy_executor::SendSpawner,
+    card: VirtNet,
+    disk: Flash,
+    port: SerialPort,
+) {
     static DISK: StaticCell<Disk> = StaticCell::new();
     let disk = DISK.init(Mutex::new(disk));
     let part = |range: Range<u32>| Partition::new(disk, range.start, range.end - range.start);
     let memory = Memory::new(part(SETTINGS), 0..SETTINGS.end - SETTINGS.start);
     let album = Album::new(part(DRAWINGS), 0..DRAWINGS.end - DRAWINGS.start);
-    let (Some(mut memory), Some(mut album)) = (memory, album) else {
+    let (Some(memory), Some(album)) = (memory, album) else {
         log::error!("settings and drawings do not lie in whole pages");
         return;
     };
+    static MEMORY: StaticCell<Memory<Part>> = StaticCell::new();
+    let memory = MEMORY.init(memory);
+    static ALBUM: StaticCell<Album<Part>> = StaticCell::new();
+    let album = ALBUM.init(album);
     // QEMU that takes no sleep (`-icount sleep=off`) now and then forgets a disk that answers while no
     // alarm is set: so there is one.
     let alarm = async {
@@ -99,7 +116,11 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         identity,
         virt::VITALS,
     ));
-    if start(spawner, tick, house, (memory, album), card).is_err() {
+    let started = serial(house, port).map(|task| spawner.spawn(task));
+    if started
+        .and_then(|()| start(spawner, tick, house, (memory, album), card))
+        .is_err()
+    {
         log::error!("a task does not fit");
     }
 }
@@ -108,10 +129,10 @@ fn start(
     spawner: Spawner,
     tick: embassy_executor::SendSpawner,
     house: &'static House,
-    (memory, album): (Memory<Part>, Album<Part>),
+    (memory, album): (&'static mut Memory<Part>, &'static mut Album<Part>),
     card: VirtNet,
 ) -> Result<(), SpawnError> {
-    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
+    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 3 }>> = StaticCell::new();
     static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; CONNECTIONS]> =
         ConstStaticCell::new([const { Buffers::new() }; _]);
     static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
@@ -128,6 +149,7 @@ fn start(
         embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
     spawner.spawn(network_stack(runner)?);
     spawner.spawn(tell_address(stack)?);
+    spawner.spawn(discovery(house, Multicast::new(stack))?);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(tcp, client, house)?);
@@ -161,12 +183,18 @@ async fn servo_tick(house: &'static House) {
 }
 
 #[embassy_executor::task]
-async fn storage(house: &'static House, memory: Memory<Part>) {
+async fn serial(house: &'static House, port: SerialPort) {
+    let (from, to) = port;
+    serve(from, to, ReadError::ByteLost, &mut Inputs, house).await;
+}
+
+#[embassy_executor::task]
+async fn storage(house: &'static House, memory: &'static mut Memory<Part>) {
     house.store.run(memory).await;
 }
 
 #[embassy_executor::task]
-async fn drawings(house: &'static House, album: Album<Part>) {
+async fn drawings(house: &'static House, album: &'static mut Album<Part>) {
     house.drawings.run(album).await;
 }
 
@@ -197,6 +225,15 @@ async fn wifi(house: &'static House) {
 #[embassy_executor::task]
 async fn network_stack(mut runner: Runner<'static, VirtNet>) {
     runner.run().await;
+}
+
+#[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast) {
+    let ports = Ports {
+        line_us: PORT,
+        web: None,
+    };
+    discovery::run(house, &multicast, || multicast.address(), ports).await;
 }
 
 #[embassy_executor::task]

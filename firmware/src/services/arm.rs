@@ -11,7 +11,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::{Mutex as Turns, MutexGuard as Turn};
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
-use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report};
+use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report, StopReason};
 use protocol_core::motion::Micros;
 
 /// The arm as its clients see it.
@@ -20,6 +20,8 @@ pub struct Arm {
     reports: [Signal<CriticalSectionRawMutex, Report>; MAX_ASKERS],
     /// Several services ask in the name of [`Client::HOUSE`], which has one errand at a time as well.
     house: Turns<CriticalSectionRawMutex, ()>,
+    /// For the serial port's task alone.
+    plan_changed: Signal<CriticalSectionRawMutex, ()>,
 }
 
 impl Arm {
@@ -29,6 +31,7 @@ impl Arm {
             machine: Mutex::new(RefCell::new(machine)),
             reports: array::from_fn(|_| Signal::new()),
             house: Turns::new(()),
+            plan_changed: Signal::new(),
         }
     }
 
@@ -75,6 +78,37 @@ impl Arm {
         })
     }
 
+    /// Waits until the plan has room for a segment; a stop makes room.
+    pub async fn room(&self) {
+        self.until(|machine| machine.plan_room() > 0).await;
+    }
+
+    /// Waits until everything planned has been done, or forgotten in a stop.
+    pub async fn plan_done(&self) {
+        self.until(Machine::plan_is_done).await;
+    }
+
+    async fn until(&self, holds: impl Fn(&Machine) -> bool) {
+        while !self.with(|machine| holds(machine)) {
+            self.plan_changed.wait().await;
+        }
+    }
+
+    /// Stops the arm, whoever moves it, and answers those who wait for a move.
+    pub fn stop(&self, reason: StopReason) {
+        self.with(|machine| machine.stop(reason));
+        self.deliver();
+    }
+
+    /// Lets a stopped arm move again; says whether it was stopped.
+    pub fn resume(&self) -> bool {
+        self.with(|machine| {
+            let stopped = machine.stopped().is_some();
+            machine.resume();
+            stopped
+        })
+    }
+
     /// The servo tick: one set-point in each of the servos' frames, which are `length` apart, for ever.
     ///
     /// The machine's time is the number of frames, so that a set-point is a function of the moves and
@@ -110,6 +144,9 @@ impl Arm {
             if let Some(signal) = self.reports.get(client.slot()) {
                 signal.signal(report);
             }
+        }
+        if self.with(Machine::plan_has_changed) {
+            self.plan_changed.signal(());
         }
     }
 }

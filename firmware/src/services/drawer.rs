@@ -254,8 +254,8 @@ async fn replay_once(replay: Replay, house: &House) -> Option<Option<Order>> {
     })
 }
 
-/// Draws what a source gives: lines of G-code. What is no drawing is passed over. May be dropped at any time;
-/// then [`lift`] ends it.
+/// Draws what a source gives: lines of G-code. What is no drawing is passed over. It ends where the machine
+/// is stopped. May be dropped at any time; then [`lift`] ends it.
 ///
 /// # Errors
 /// When the source fails.
@@ -276,19 +276,28 @@ pub async fn draw<S: Read>(
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
             let request = match (request, pen) {
-                (Request::Errand(Errand::Move(manner, target)), Pen::Up) => {
-                    let up = WideCoordinate::from_bits(PEN_UP.bits().into());
-                    let target = Target {
-                        z: Some(up),
-                        ..target
-                    };
-                    Request::Errand(Errand::Move(manner, target))
-                }
+                (Request::Errand(errand), Pen::Up) => Request::Errand(with_pen_up(errand)),
                 (request @ (Request::Errand(_) | Request::SetSpeed { .. }), _) => request,
                 _ => continue,
             };
             perform(&request, &mut reply, client, house).await;
+            // What was not drawn meanwhile would be missing in the picture.
+            if house.arm.with(|machine| machine.stopped().is_some()) {
+                return Ok(());
+            }
         }
+    }
+}
+
+fn with_pen_up(errand: Errand) -> Errand {
+    let lifted = |target| Target {
+        z: Some(WideCoordinate::from_bits(PEN_UP.bits().into())),
+        ..target
+    };
+    match errand {
+        Errand::Move(manner, target) => Errand::Move(manner, lifted(target)),
+        Errand::Uncalibrated(target, bare) => Errand::Uncalibrated(lifted(target), bare),
+        Errand::Dwell(_) | Errand::Wave | Errand::Rest => errand,
     }
 }
 

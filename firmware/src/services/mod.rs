@@ -2,17 +2,22 @@
 
 pub mod arm;
 pub mod dhcp;
+pub mod discovery;
 pub mod drawer;
 pub mod drawings;
 pub mod line_us;
+pub mod names;
 pub mod network;
 pub mod panel;
+pub mod portal;
+pub mod serial;
 pub mod storage;
 
 use crate::board::Vitals;
 use arm::Arm;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
+use discovery::Discovery;
 use drawer::Drawer;
 use drawings::Drawings;
 use embassy_sync::blocking_mutex::Mutex;
@@ -39,6 +44,8 @@ pub struct House {
     pub drawer: Drawer,
     /// The network to be in.
     pub wifi: Wifi,
+    /// How the machine is found.
+    pub discovery: Discovery,
     /// Light and button.
     pub panel: Panel,
     /// Who this machine is.
@@ -53,12 +60,16 @@ pub struct House {
 impl House {
     /// An arm at home, with the settings it remembers.
     pub fn new(data: ArmData, settings: Settings, identity: Identity, vitals: Vitals) -> Self {
+        let mut machine = Machine::new(data, settings.calibration);
+        machine.set_compensation(settings.compensation());
+        machine.set_directions(settings.directions);
         Self {
-            arm: Arm::new(Machine::new(data, settings.calibration)),
+            arm: Arm::new(machine),
             store: Store::new(),
             drawings: Drawings::new(),
             drawer: Drawer::new(),
             wifi: Wifi::new(),
+            discovery: Discovery::new(),
             panel: Panel::new(),
             identity,
             vitals,
@@ -101,18 +112,19 @@ impl House {
     /// Forgets everything: factory reset.
     ///
     /// # Errors
-    /// When the memory does not take it: nothing has changed then.
+    /// When the memory does not take it: nothing has changed then, or drawings are left.
     async fn forget_everything(&self) -> Result<(), StoreError> {
         let forget = |settings: &mut Settings| *settings = Settings::default();
         self.change(Client::HOUSE, forget).await?;
-        self.wifi.restart();
         self.drawer.set_replay(None);
         self.drawer.stop();
+        let mut outcome = Ok(());
         for (slot, _) in self.drawings.contents().iter() {
             let deleted = self.drawings.delete(slot, Client::HOUSE, &self.arm).await;
-            deleted.map_err(|_| StoreError)?;
+            outcome = outcome.and(deleted.map_err(|_| StoreError));
         }
-        Ok(())
+        self.wifi.restart();
+        outcome
     }
 
     /// Which drawing a short press of the button draws now.
@@ -161,11 +173,20 @@ impl House {
     }
 
     fn put_in_force(&self, new: Settings) {
-        let calibration = new.calibration;
+        let (calibration, directions) = (new.calibration, new.directions);
+        let (map, shift, compensation) = (new.map, new.shift, new.compensation());
         let old = self.settings.lock(|settings| settings.replace(new));
-        if old.calibration != calibration {
-            self.arm
-                .with(|machine| machine.set_calibration(calibration));
-        }
+        self.discovery.renamed();
+        self.arm.with(|machine| {
+            if old.calibration != calibration {
+                machine.set_calibration(calibration);
+            }
+            if (old.map, old.shift) != (map, shift) {
+                machine.set_compensation(compensation);
+            }
+            if old.directions != directions {
+                machine.set_directions(directions);
+            }
+        });
     }
 }

@@ -18,7 +18,7 @@ use protocol_core::settings::StartMode;
 /// How long the light tells that everything could not be forgotten.
 const COMPLAINT: Duration = Duration::from_secs(5);
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 struct Shown {
     /// What the machine does.
     lamp: Lamp,
@@ -61,8 +61,14 @@ impl Panel {
     }
 
     fn change(&self, f: impl FnOnce(Shown) -> Shown) {
-        self.shown.lock(|shown| shown.set(f(shown.get())));
-        self.changed.signal(());
+        let differs = self.shown.lock(|shown| {
+            let after = f(shown.get());
+            shown.replace(after) != after
+        });
+        // The same again does not disturb the rhythm.
+        if differs {
+            self.changed.signal(());
+        }
     }
 
     /// The light, for ever. White lasts as long as a press means a factory reset.
@@ -125,6 +131,8 @@ pub async fn watch(house: &House, mut pin: impl Wait + InputPin) -> ! {
 
 async fn act(house: &House, gesture: Gesture) {
     match gesture {
+        // What a person wants first of a machine that is stopped.
+        Gesture::Short if house.arm.resume() => info!("resumed by the button"),
         // Whatever the network is doing.
         Gesture::Short if house.drawer.stop() => {}
         Gesture::Short | Gesture::Long => house.wifi.press(gesture),

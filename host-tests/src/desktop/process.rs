@@ -176,6 +176,12 @@ impl Desktop {
         log.iter().any(|line| line.contains(text))
     }
 
+    /// How many of the lines that it has printed contain `text`.
+    pub fn count(&self, text: &str) -> usize {
+        let log = self.log.lock().expect("the log's thread lives");
+        log.iter().filter(|line| line.contains(text)).count()
+    }
+
     /// Waits until `count` clients have left, as it prints.
     ///
     /// # Panics

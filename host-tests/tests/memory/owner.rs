@@ -58,7 +58,7 @@ pub fn change(before: &Settings, dice: &mut Dice, habits: Habits) -> Settings {
         3 | 4 => {
             let network = network(dice, habits.lengths);
             // One that is not remembered any more makes room.
-            if after.networks.len() == habits.networks
+            if after.networks.len() >= habits.networks
                 && let Some(oldest) = before.networks.iter().next()
             {
                 after.networks.remove(&oldest.ssid);

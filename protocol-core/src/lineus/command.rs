@@ -1,11 +1,16 @@
 //! A line becomes a typed command here, once; nothing downstream sees text.
 
+mod fitting;
+
 use super::refusal::Refusal;
+use crate::arm::{NibShift, ZMap};
 use crate::drawings::{ButtonDraws, MAX_DRAWINGS, Replay, Slot};
-use crate::machine::Manner;
-use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
+use crate::machine::{Bare, Manner};
+use crate::motion::{
+    Coordinate, MAX_COORDINATE, MAX_SCALE, Micros, StepRange, StepSize, Transform,
+};
 use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
-use crate::text::Words;
+use crate::text::{Text, Words};
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Password, Ssid};
 
 /// A valid command, its numbers as written: not yet scaled, not yet limited.
@@ -58,6 +63,10 @@ pub enum Command {
         /// How its own network is called.
         name: Option<AccessPointName>,
     },
+    /// M589.
+    OwnNetwork,
+    /// `M589 P`: the password of the machine's own network, `None` for an open one.
+    ProtectOwnNetwork(Option<Password>),
     /// M291.
     Waves,
     /// `M291 S1`, `M291 S2`.
@@ -97,6 +106,25 @@ pub enum Command {
     Replaying,
     /// `M85 S P K`; `M85 S0` for `None`.
     SetReplay(Option<Replay>),
+    /// G4.
+    Dwell(Micros),
+    /// G31.
+    Compensation,
+    /// `G31 S`, `G31 P`.
+    SetCompensation {
+        /// How high the paper lies.
+        map: Option<ZMap>,
+        /// How the nib moves as it comes down.
+        shift: Option<NibShift>,
+    },
+    /// G40.
+    Uncalibrated(Axes, Bare),
+    /// `M171 Sconfirm`.
+    FactoryReset,
+    /// M280.
+    Directions,
+    /// `M280 S E P`: whether shoulder, elbow and pen turn the other way.
+    SetDirections([Option<bool>; 3]),
 }
 
 /// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
@@ -140,7 +168,10 @@ fn other_than_a_move<'a>(
     line: &'a [u8],
 ) -> Result<Command, Refusal<'a>> {
     match code {
+        (b'G', 4) => fitting::dwell(&mut words),
         (b'G', 28) => without_parameters(&mut words, Command::Home),
+        (b'G', 31) => fitting::compensation(&mut words),
+        (b'G', 40) => fitting::uncalibrated(&mut words),
         (b'G', 54) => transform(&mut words),
         (b'G', 94) => speed(&mut words),
         (b'M', 20) => without_parameters(&mut words, Command::Drawings),
@@ -153,12 +184,16 @@ fn other_than_a_move<'a>(
         (b'M', 114) => position(&mut words),
         (b'M', 115) => without_parameters(&mut words, Command::Capabilities),
         (b'M', 122) => without_parameters(&mut words, Command::Diagnostics),
+        (b'M', number @ (170 | 172)) => Err(Refusal::Reserved(number)),
+        (b'M', 171) => fitting::factory_reset(&mut words),
+        (b'M', 280) => fitting::directions(&mut words),
         (b'M', 374) => calibration(&mut words),
         (b'M', 550) => name(&mut words),
         (b'M', 291) => waves(&mut words),
         (b'M', 552) => start(&mut words),
         (b'M', 587) => network(&mut words),
         (b'M', 588) => forget(&mut words),
+        (b'M', 589) => own_network(&mut words),
         (b'M', 997) => Err(Refusal::NotYet),
         _ => Err(Words::new(line).unknown().into()),
     }
@@ -320,11 +355,7 @@ fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         letters.once(letter)?;
         match letter {
             'S' => ssid = Some(network_name(words)?),
-            'P' => {
-                let phrase = words.text(letter)?.unescape::<MAX_PASSWORD>();
-                let phrase = phrase.and_then(|phrase| Password::new(&phrase));
-                password = Some(phrase.ok_or(Refusal::BadPassword)?);
-            }
+            'P' => password = Some(network_password(&words.text(letter)?)?),
             _ => return Err(Refusal::UnknownParameter(letter)),
         }
     }
@@ -348,6 +379,28 @@ fn forget<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
+}
+
+/// M589 is where RepRap firmware has the password of a machine's own network.
+fn own_network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    match words.letter()? {
+        None => Ok(Command::OwnNetwork),
+        Some('P') => {
+            let text = words.text('P')?;
+            let password = match text.raw() {
+                [] => None,
+                _ => Some(network_password(&text)?),
+            };
+            without_parameters(words, Command::ProtectOwnNetwork(password))
+        }
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn network_password<'a>(text: &Text<'a>) -> Result<Password, Refusal<'a>> {
+    text.unescape::<MAX_PASSWORD>()
+        .and_then(|phrase| Password::new(&phrase))
+        .ok_or(Refusal::BadPassword)
 }
 
 fn network_name<'a>(words: &mut Words<'a>) -> Result<Ssid, Refusal<'a>> {
@@ -476,9 +529,11 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
                 Command::Angles
                     | Command::ClearCalibration
                     | Command::Rename(_)
+                    | Command::ProtectOwnNetwork(_)
                     | Command::SetWaves(_)
                     | Command::Forget(_)
                     | Command::ForgetAll
+                    | Command::FactoryReset
             ) =>
         {
             Err(Refusal::Repeated(letter))

@@ -29,7 +29,9 @@ const fn fate(command: &Command) -> Fate {
         | Command::Move(..)
         | Command::Home
         | Command::Transform { .. }
-        | Command::Speed { .. } => Fate::Kept,
+        | Command::Speed { .. }
+        | Command::Dwell(_)
+        | Command::Uncalibrated(..) => Fate::Kept,
         Command::Position
         | Command::Angles
         | Command::Capabilities
@@ -41,6 +43,9 @@ const fn fate(command: &Command) -> Fate {
         | Command::Drawings
         | Command::Space
         | Command::Button
+        | Command::Compensation
+        | Command::Directions
+        | Command::OwnNetwork
         | Command::Replaying => Fate::Answered,
         Command::EndRecording => Fate::End,
         Command::Calibrate
@@ -56,6 +61,10 @@ const fn fate(command: &Command) -> Fate {
         | Command::StopDrawing
         | Command::Record(_)
         | Command::Delete(_)
+        | Command::SetCompensation { .. }
+        | Command::SetDirections(_)
+        | Command::FactoryReset
+        | Command::ProtectOwnNetwork(_)
         | Command::SetReplay(_) => Fate::Refused,
     }
 }

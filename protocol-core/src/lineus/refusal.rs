@@ -1,5 +1,6 @@
 //! Why a line is refused, and the one place where that becomes text.
 
+use crate::arm::MAX_HEIGHT;
 use crate::drawings::Slot;
 use crate::settings::MAX_NAME;
 use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt, excerpt_of_bytes};
@@ -15,6 +16,8 @@ pub enum Refusal<'a> {
     Words(WordError<'a>),
     /// M997, which this firmware will know, but does not yet.
     NotYet,
+    /// An M code of the original's that no document tells the meaning of.
+    Reserved(u32),
     /// A letter that the command does not have.
     UnknownParameter(char),
     /// A letter that the command needs.
@@ -51,6 +54,8 @@ pub enum Refusal<'a> {
     NoSuchDrawing(Slot),
     /// A text that the parameter cannot have, and what it may be.
     BadText(char, &'a [u8], &'static str),
+    /// No map of heights.
+    BadMap(&'a [u8]),
     /// A password of a length that none has; what it is stays a secret.
     BadPassword,
     /// No machine name.
@@ -81,6 +86,7 @@ impl fmt::Display for Refusal<'_> {
             Self::NotYet => {
                 out.write_str("M997 is missing: this firmware cannot update itself yet")
             }
+            Self::Reserved(number) => write!(out, "M{number} is reserved and does nothing here"),
             Self::Missing(letter) => write!(out, "parameter {letter} is missing"),
             Self::UnknownParameter(letter) => write!(out, "unknown parameter {letter}"),
             Self::Repeated(letter) => write!(out, "parameter {letter} is repeated"),
@@ -112,6 +118,11 @@ impl fmt::Display for Refusal<'_> {
                     excerpt_of_bytes(text, MAX_EXCERPT)
                 )
             }
+            Self::BadMap(text) => write!(
+                out,
+                "S is '{}', it may be 'clear' or four whole numbers, -{MAX_HEIGHT} to {MAX_HEIGHT}, as in 0;100;300;200",
+                excerpt_of_bytes(text, MAX_EXCERPT)
+            ),
             Self::BadPassword => write!(out, "P must be {MIN_PASSWORD} to {MAX_PASSWORD} bytes"),
             Self::BadName(text) => write!(
                 out,

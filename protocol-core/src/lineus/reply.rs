@@ -1,7 +1,7 @@
 //! What the machine says: one message for each command, built in place, ended as every message is.
 
 use super::refusal::Refusal;
-use crate::arm::{Angles, Calibration};
+use crate::arm::{Angles, Calibration, Compensation, Directions, NibShift, ZMap};
 use crate::drawings::{ButtonDraws, Contents, MAX_DRAWINGS, Replay, Space};
 use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
@@ -51,6 +51,8 @@ impl Identity {
 pub struct Diagnostics<'a> {
     /// The machine's name.
     pub name: &'a MachineName,
+    /// The name under which it is found, without `.local`; `None` where it is not.
+    pub host: Option<&'a str>,
     /// Who it is.
     pub identity: Identity,
     /// Time since it started.
@@ -59,6 +61,10 @@ pub struct Diagnostics<'a> {
     pub position: Position,
     /// The servos' offsets.
     pub calibration: Calibration,
+    /// Paper and lift.
+    pub compensation: &'a Compensation,
+    /// Which servos turn the other way.
+    pub directions: Directions,
     /// What the network is doing.
     pub wifi: &'a Status,
     /// How many networks are remembered.
@@ -136,6 +142,7 @@ impl Reply {
     pub fn report(&mut self, report: &Report) {
         match report {
             Report::Resting => self.ok(),
+            Report::Stopped => self.error(format_args!("{STOPPED}")),
             Report::Moving { end, limited } => self.place(*end, limited.map(tell)),
         }
     }
@@ -174,9 +181,29 @@ impl Reply {
         ));
     }
 
+    /// Whether its own network takes a password, which is not told.
+    pub fn own_network(&mut self, settings: &Settings) {
+        let password = match settings.own_password {
+            Some(_) => "set",
+            None => "none",
+        };
+        self.compose(format_args!("ok PASSWORD:{password}"));
+    }
+
     /// Whether the machine waves.
     pub fn waves(&mut self, on: bool) {
         self.compose(format_args!("ok S:{}", if on { 1 } else { 2 }));
+    }
+
+    /// How high the paper lies, and how far the nib moves as it comes down.
+    pub fn compensation(&mut self, map: ZMap, shift: NibShift) {
+        self.compose(format_args!("ok S:{map} P:{shift}"));
+    }
+
+    /// Which servos turn the other way.
+    pub fn directions(&mut self, directions: Directions) {
+        let [shoulder, elbow, pen] = numbers(directions);
+        self.compose(format_args!("ok S:{shoulder} E:{elbow} P:{pen}"));
     }
 
     /// Networks: those that are heard, in the order given, which is by strength, each with 1 where it is
@@ -279,12 +306,15 @@ impl Reply {
         let [a, b, c, d, e, f] = state.identity.mac;
         let Position { x, y, z } = state.position;
         let [shoulder, elbow, pen] = state.calibration.offsets.to_array().map(Degrees);
+        let [turn_s, turn_e, turn_p] = numbers(state.directions);
+        let (map, shift) = (state.compensation.map(), state.compensation.shift());
         self.compose(format_args!(
-            "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
+            "ok name:{}{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
-             WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
+             ZMap:{map} NibShift:{shift} Servos:{turn_s},{turn_e},{turn_p} WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
              FSUsed:{} FSTotal:{} FSFree:{} Memory:\"{}\"{}",
             state.name.as_str(),
+            Host(state.host),
             state.identity.serial(),
             Uptime(state.uptime),
             x.rounded(),
@@ -366,12 +396,20 @@ impl Reply {
     }
 }
 
+/// Why there is no move.
+const STOPPED: &str = "the machine is stopped: send ~ on the serial line or press the button";
+
 fn tell(limited: Limited) -> &'static str {
     match limited {
         Limited::Target { lifted: true } => "out of reach: going to the closest point, pen lifted",
         Limited::Target { lifted: false } => "out of reach: going to the closest point",
         Limited::Way => "the way leaves the drawing area: held at its edge",
     }
+}
+
+/// As behind the letters of M280.
+fn numbers(directions: Directions) -> [u8; 3] {
+    directions.reversed.map(|reversed| 1 + u8::from(reversed))
 }
 
 const fn mode(own_network: bool) -> &'static str {
@@ -440,6 +478,17 @@ impl fmt::Display for Degrees {
         let sign = if hundredths < 0 { "-" } else { "" };
         let magnitude = hundredths.unsigned_abs();
         write!(out, "{sign}{}.{:02}", magnitude / 100, magnitude % 100)
+    }
+}
+
+struct Host<'a>(Option<&'a str>);
+
+impl fmt::Display for Host<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(host) => write!(out, " Host:{host}.local"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -522,6 +571,20 @@ mod tests {
             said(|reply| reply.angles(HOME_ANGLES)),
             "ok S:135.00 E:45.00 P:135.00"
         );
+    }
+
+    #[test]
+    fn paper_lift_and_directions() {
+        let map = ZMap::new([0, 100, 300, -200]).unwrap();
+        let shift = NibShift::from_hundredths(-85).unwrap();
+        assert_eq!(
+            said(|reply| reply.compensation(map, shift)),
+            "ok S:0;100;300;-200 P:-0.85"
+        );
+        let directions = Directions {
+            reversed: [false, true, false],
+        };
+        assert_eq!(said(|reply| reply.directions(directions)), "ok S:1 E:2 P:1");
     }
 
     #[test]
@@ -651,16 +714,32 @@ mod tests {
     }
 
     #[test]
+    fn a_stopped_machine_says_how_to_go_on() {
+        assert_eq!(
+            said(|reply| reply.report(&Report::Stopped)),
+            "error INFO:\"the machine is stopped: send ~ on the serial line or press the button\""
+        );
+    }
+
+    #[test]
     fn every_token_of_the_diagnostics_has_a_colon() {
         let longest = MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap();
         let text = said(|reply| {
             reply.diagnostics(&Diagnostics {
                 name: &longest,
+                host: Some("abcdefghijklmnopqrstuvwxyz012345-9999"),
                 identity: Identity { mac: [0xff; 6] },
                 uptime: Micros::new(u64::MAX),
                 position: Position::from_units(-1950, -1950, 1000),
                 calibration: Calibration {
                     offsets: Angles::from_array([i32::MIN; 3].map(Microdegrees::new)),
+                },
+                compensation: &Compensation::new(
+                    ZMap::new([-500; 4]).unwrap(),
+                    NibShift::from_hundredths(-200).unwrap(),
+                ),
+                directions: Directions {
+                    reversed: [true; 3],
                 },
                 wifi: &Status {
                     setup: true,

@@ -4,6 +4,7 @@ use super::command::{Command, parse};
 use super::recording;
 use super::refusal::Refusal;
 use super::reply::Reply;
+use crate::arm::{NibShift, ZMap};
 use crate::drawings::{ButtonDraws, Replay, Slot};
 use crate::machine::{Errand, Manner, Target};
 use crate::motion::{StepSize, Transform, WideCoordinate};
@@ -51,6 +52,11 @@ pub enum Request {
         /// How its own network is called.
         name: Option<AccessPointName>,
     },
+    /// To be answered by [`Reply::own_network`].
+    OwnNetwork,
+    /// The password of the machine's own network, `None` for an open one; to be remembered, and answered by
+    /// [`Reply::ok`].
+    ProtectOwnNetwork(Option<Password>),
     /// To be answered by [`Reply::waves`].
     Waves,
     /// To be remembered, and answered by [`Reply::ok`].
@@ -94,6 +100,22 @@ pub enum Request {
     Replaying,
     /// To be answered by [`Reply::ok`].
     SetReplay(Option<Replay>),
+    /// To be answered by [`Reply::compensation`].
+    Compensation,
+    /// To be remembered, and answered by [`Reply::ok`].
+    SetCompensation {
+        /// How high the paper lies.
+        map: Option<ZMap>,
+        /// How the nib moves as it comes down.
+        shift: Option<NibShift>,
+    },
+    /// Everything is to be forgotten; answered by [`Reply::ok`].
+    FactoryReset,
+    /// To be answered by [`Reply::directions`].
+    Directions,
+    /// To be remembered, and answered by [`Reply::ok`]: whether shoulder, elbow and pen turn the other
+    /// way.
+    SetDirections([Option<bool>; 3]),
 }
 
 /// What belongs to one connection: the line being received, scale and origin, and whether what comes is
@@ -201,6 +223,8 @@ pub(super) fn request(
         Command::Name => Request::Name,
         Command::Rename(name) => Request::Rename(name.clone()),
         Command::Start => Request::Start,
+        Command::OwnNetwork => Request::OwnNetwork,
+        Command::ProtectOwnNetwork(password) => Request::ProtectOwnNetwork(password.clone()),
         Command::SetStart { mode, name } => Request::SetStart {
             mode: *mode,
             name: *name,
@@ -225,6 +249,28 @@ pub(super) fn request(
         Command::Delete(slot) => Request::Delete(*slot),
         Command::Replaying => Request::Replaying,
         Command::SetReplay(replay) => Request::SetReplay(*replay),
+        Command::Dwell(duration) => Request::Errand(Errand::Dwell(*duration)),
+        Command::Compensation => Request::Compensation,
+        Command::SetCompensation { map, shift } => Request::SetCompensation {
+            map: *map,
+            shift: *shift,
+        },
+        Command::Uncalibrated(axes, bare) => {
+            let [x, y, z] = axes.to_array();
+            let here = match bare.xy {
+                true => Transform::IDENTITY,
+                false => *scale_and_origin,
+            };
+            let target = Target {
+                x: x.map(|x| here.x(x)),
+                y: y.map(|y| here.y(y)),
+                z: z.map(WideCoordinate::from_bits),
+            };
+            Request::Errand(Errand::Uncalibrated(target, *bare))
+        }
+        Command::FactoryReset => Request::FactoryReset,
+        Command::Directions => Request::Directions,
+        Command::SetDirections(servos) => Request::SetDirections(*servos),
     }
 }
 
@@ -232,6 +278,8 @@ pub(super) fn request(
 mod tests {
     extern crate std;
     use super::*;
+    use crate::machine::Bare;
+    use crate::motion::Micros;
     use crate::wifi::{Password, Ssid};
     use proptest::prelude::*;
     use std::string::{String, ToString};
@@ -365,9 +413,57 @@ mod tests {
             ("M552 P3", "P must be a whole number, 1 to 2"),
             ("M552 S1 S2", "parameter S is repeated"),
             ("M552 X1", "unknown parameter X"),
+            ("M589 S1", "unknown parameter S"),
+            ("M589 Pseven..", "P must be 8 to 63 bytes"),
+            ("M589 P", "P has no value"),
+            ("M589 P\"\" P\"\"", "parameter P is repeated"),
             ("M291 S3", "S must be a whole number, 1 to 2"),
             ("M291 S", "S has no number"),
             ("M291 S1 S1", "parameter S is repeated"),
+            ("G4", "parameter P is missing"),
+            ("G4 P-1", "P is out of range, 0 to 3600"),
+            ("G4 S3600.1", "S is out of range, 0 to 3600"),
+            ("G04 P1 S1", "parameter S is repeated"),
+            ("G4 P1 P1", "parameter P is repeated"),
+            ("G4 X1", "unknown parameter X"),
+            ("G4 P", "P has no number"),
+            ("G31 S", "S has no value"),
+            ("G31 S ;0;0;0;0", "S has no value"),
+            (
+                "G31 S0;100;300",
+                "S is '0;100;300', it may be 'clear' or four whole numbers, -500 to 500, as in 0;100;300;200",
+            ),
+            (
+                "G31 S0;100;300;501",
+                "S is '0;100;300;501', it may be 'clear' or four whole numbers, -500 to 500, as in 0;100;300;200",
+            ),
+            (
+                "G31 S0; 100; 300; 200",
+                "S is '0;', it may be 'clear' or four whole numbers, -500 to 500, as in 0;100;300;200",
+            ),
+            ("G31 S\"0;1", "S has no closing quote"),
+            ("G31 P2.01", "P is out of range, -2 to 2"),
+            ("G31 P-3", "P is out of range, -2 to 2"),
+            ("G31 P0.5mm", "unknown parameter M"),
+            ("G31 Sclear Sclear", "parameter S is repeated"),
+            ("G31 X0", "unknown parameter X"),
+            ("G40 Kx", "K is 'x', it may be 'xy' or 'z'"),
+            ("G40 K", "K has no value"),
+            ("G40 X1 Kxy Kz", "parameter K is repeated"),
+            ("G40 X1 X2", "parameter X is repeated"),
+            ("G40 F5", "unknown parameter F"),
+            ("G40 X1e9", "X is out of range, -1000000 to 1000000"),
+            ("M170", "M170 is reserved and does nothing here"),
+            ("m172 S1 ;x", "M172 is reserved and does nothing here"),
+            ("M171", "parameter S is missing"),
+            ("M171 Sconform", "S is 'conform', it may be 'confirm'"),
+            ("M171 Sconfirm S", "parameter S is repeated"),
+            ("M171 Pconfirm", "unknown parameter P"),
+            ("M280 S3", "S must be a whole number, 1 to 2"),
+            ("M280 E0", "E must be a whole number, 1 to 2"),
+            ("M280 P-1", "P must be a whole number, 1 to 2"),
+            ("M280 S1 S2", "parameter S is repeated"),
+            ("M280 Z1", "unknown parameter Z"),
             (
                 "M997",
                 "M997 is missing: this firmware cannot update itself yet",
@@ -482,6 +578,12 @@ mod tests {
             ("M552 S3", set(Some(StartMode::AccessPointLocked), None)),
             ("M552 S4.0", set(Some(StartMode::StationLongPress), None)),
             ("M552 P1", set(None, Some(AccessPointName::Setup))),
+            ("M589", Request::OwnNetwork),
+            (
+                "M589 P\"correct horse\"",
+                Request::ProtectOwnNetwork(Password::new(b"correct horse")),
+            ),
+            ("M589 P\"\"", Request::ProtectOwnNetwork(None)),
             ("M291", Request::Waves),
             ("M291 S1", Request::SetWaves(true)),
             ("M291 S2", Request::SetWaves(false)),
@@ -549,6 +651,79 @@ mod tests {
         ] {
             let refused = std::format!("error INFO:\"{reason}\"");
             assert_eq!(only(line), (Request::Answered, refused), "{line}");
+        }
+    }
+
+    #[test]
+    fn dwells_in_seconds() {
+        for (line, micros) in [
+            ("G4 P0.5", 500_000),
+            ("G4 S2", 2_000_000),
+            ("g04 p1e-3", 1_000),
+            ("G4 P0", 0),
+            ("G4 P3600", 3_600_000_000),
+            ("G4 P0.123456", 123_456),
+        ] {
+            let dwell = Errand::Dwell(Micros::new(micros));
+            assert_eq!(only(line).0, Request::Errand(dwell), "{line}");
+        }
+    }
+
+    #[test]
+    fn maps_and_shifts() {
+        let set = |map: Option<[i16; 4]>, hundredths: Option<i16>| Request::SetCompensation {
+            map: map.map(|corners| ZMap::new(corners).unwrap()),
+            shift: hundredths.map(|shift| NibShift::from_hundredths(shift).unwrap()),
+        };
+        for (line, request) in [
+            ("G31", Request::Compensation),
+            ("G31 ; how is it", Request::Compensation),
+            ("G31 S0;100;300;200", set(Some([0, 100, 300, 200]), None)),
+            ("g31 s-5;0;7;500 ; here", set(Some([-5, 0, 7, 500]), None)),
+            ("G31 S1;2;3;4(four)", set(Some([1, 2, 3, 4]), None)),
+            (
+                "G31 S\"0; 100; 300; 200\"",
+                set(Some([0, 100, 300, 200]), None),
+            ),
+            ("G31 Sclear", set(Some([0; 4]), None)),
+            ("G31 SCLEAR P0", set(Some([0; 4]), Some(0))),
+            ("G31 P0.85", set(None, Some(85))),
+            ("G31 P-1.234 S1;1;1;1", set(Some([1; 4]), Some(-123))),
+            ("G31 P2", set(None, Some(200))),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
+        }
+    }
+
+    #[test]
+    fn bare_moves_know_no_scale_and_origin() {
+        let mut session = Session::new();
+        let stream = b"G54 X100 Y0 S2\nG40 X900 Y300 Z5\nG40 X400 Y150 Kxy\nG40 Z7 Kz\nG40\n";
+        let found = requests(&mut session, stream);
+        let bare = |target, xy, z| Request::Errand(Errand::Uncalibrated(target, Bare { xy, z }));
+        for (found, expected) in found.iter().skip(1).zip([
+            bare(target(Some(900.0), Some(300.0), Some(5.0)), true, true),
+            bare(target(Some(900.0), Some(300.0), None), false, true),
+            bare(target(None, None, Some(7.0)), true, false),
+            bare(Target::default(), true, true),
+        ]) {
+            assert_eq!(found.0, expected);
+        }
+        assert_eq!(found.len(), 5);
+    }
+
+    #[test]
+    fn directions_and_the_factory_reset() {
+        let set = |servos| Request::SetDirections(servos);
+        for (line, request) in [
+            ("M280", Request::Directions),
+            ("M280 S2", set([Some(true), None, None])),
+            ("m280 p1 e2", set([None, Some(true), Some(false)])),
+            ("M171 Sconfirm", Request::FactoryReset),
+            ("M171 SCONFIRM", Request::FactoryReset),
+            ("m171 s\"Confirm\"", Request::FactoryReset),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
         }
     }
 

@@ -89,6 +89,19 @@ impl FileFlash {
         }
     }
 
+    /// The same with something in it; `None` unless it is as much as the flash has room for.
+    pub fn holding(contents: Vec<u8>) -> Option<Self> {
+        (contents.len() == SIZE as usize).then_some(Self {
+            contents,
+            file: None,
+        })
+    }
+
+    /// Everything that is in it.
+    pub fn contents(&self) -> &[u8] {
+        &self.contents
+    }
+
     fn change(
         &mut self,
         range: Range<usize>,

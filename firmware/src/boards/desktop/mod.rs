@@ -4,8 +4,11 @@
 pub mod canvas;
 pub mod clock;
 pub mod draw;
+pub mod draw_lasaur;
 pub mod flash;
+pub mod imprint;
 pub mod net;
+pub mod pty;
 pub mod recorder;
 
 use crate::board::{Address, Vitals};

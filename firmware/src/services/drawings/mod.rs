@@ -14,6 +14,7 @@ pub use reader::Reader;
 use super::arm::Arm;
 use crate::log::warning;
 use album::{Catalogue, contents};
+use core::borrow::BorrowMut;
 use core::cell::RefCell;
 use core::fmt;
 use embassy_sync::blocking_mutex;
@@ -322,16 +323,17 @@ impl Drawings {
     }
 
     /// The service, for ever. The album is open.
-    pub async fn run<F: NorFlash>(&self, mut album: Album<F>) -> ! {
+    pub async fn run<F: NorFlash>(&self, mut album: impl BorrowMut<Album<F>>) -> ! {
+        let album = album.borrow_mut();
         // Of the task that owns the flash alone: the desk is never locked for as long as a write takes.
         let mut bytes = [0; COLLECTED];
-        self.tell(&album);
+        self.tell(album);
         loop {
             let ticket = self.request.wait().await;
             let job = self.desk(|desk| desk.job);
-            let outcome = self.work(job, &mut album, &mut bytes).await;
+            let outcome = self.work(job, album, &mut bytes).await;
             if !matches!(job, Job::Read { .. }) {
-                self.tell(&album);
+                self.tell(album);
             }
             if let Err(error @ (AlbumError::Worn | AlbumError::Damaged)) = outcome {
                 warning!("drawings: {}", error.text());

@@ -45,6 +45,14 @@ pub(in crate::services) async fn perform(
             };
             change("start mode", set, reply, client, house).await;
         }
+        Request::OwnNetwork => house.settings(|settings| reply.own_network(settings)),
+        Request::ProtectOwnNetwork(password) => {
+            let set = |settings: &mut Settings| {
+                settings.own_password = password.clone();
+                Ok(())
+            };
+            change("password", set, reply, client, house).await;
+        }
         Request::Waves => reply.waves(house.settings(|settings| settings.waves)),
         Request::SetWaves(on) => {
             let set = |settings: &mut Settings| {
@@ -86,21 +94,56 @@ pub(in crate::services) async fn perform(
             };
             change("choice", set, reply, client, house).await;
         }
+        Request::Compensation => {
+            house.settings(|settings| reply.compensation(settings.map, settings.shift));
+        }
+        Request::SetCompensation { map, shift } => {
+            let set = |settings: &mut Settings| {
+                settings.map = map.unwrap_or(settings.map);
+                settings.shift = shift.unwrap_or(settings.shift);
+                Ok(())
+            };
+            change("map", set, reply, client, house).await;
+        }
+        Request::Directions => reply.directions(house.settings(|settings| settings.directions)),
+        Request::SetDirections(servos) => {
+            let set = |settings: &mut Settings| {
+                let now = settings.directions.reversed;
+                let pairs = servos.iter().zip(now);
+                let mut new = pairs.map(|(new, now)| new.unwrap_or(now));
+                settings.directions.reversed = now.map(|now| new.next().unwrap_or(now));
+                Ok(())
+            };
+            change("direction", set, reply, client, house).await;
+        }
+        Request::FactoryReset => match house.forget_everything().await {
+            Ok(()) => reply.ok(),
+            Err(error) => refuse_store("factory reset", &error, reply),
+        },
         Request::Calibrate => calibrate(true, reply, client, house).await,
         Request::ClearCalibration => calibrate(false, reply, client, house).await,
     }
 }
 
 fn diagnose(reply: &mut Reply, house: &House) {
-    let (position, calibration) = house
-        .arm
-        .with(|machine| (machine.position(), machine.calibration()));
+    let (position, calibration, compensation, directions) = house.arm.with(|machine| {
+        let compensation = *machine.compensation();
+        (
+            machine.position(),
+            machine.calibration(),
+            compensation,
+            machine.directions(),
+        )
+    });
     reply.diagnostics(&Diagnostics {
         name: &house.name(),
+        host: house.discovery.host().as_deref(),
         identity: house.identity,
         uptime: Micros::new(house.uptime().as_micros()),
         position,
         calibration,
+        compensation: &compensation,
+        directions,
         wifi: &house.wifi.status(),
         networks: house.settings(|settings| settings.networks.len()),
         free_memory: (house.vitals.free_memory)(),

@@ -5,7 +5,7 @@ use crate::arm::Angles;
 use crate::drawings::Slot;
 use crate::motion::Microdegrees;
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Networks, Password, Ssid};
-use proptest::array::uniform3;
+use proptest::array::{uniform3, uniform4};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -35,23 +35,37 @@ fn settings() -> impl Strategy<Value = Settings> {
         choice.unwrap_or_default()
     });
     let numbers = (1..=4u8, 1..=2u8, any::<bool>(), button);
+    let fitting = (uniform4(-500..=500i16), -200..=200i16, 0..8u8);
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
+        (option::of(vec(any::<u8>(), 8..=63)), fitting),
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves, button))| Settings {
-                name: MachineName::new(&name).unwrap(),
-                calibration: Calibration {
-                    offsets: Angles::from_array(offsets.map(Microdegrees::new)),
-                },
+            |(
+                name,
+                offsets,
                 networks,
-                start: StartMode::from_number(start).unwrap(),
-                access_point: AccessPointName::from_number(access_point).unwrap(),
-                waves,
-                button,
+                (start, access_point, waves, button),
+                (own, (map, shift, servos)),
+            )| {
+                Settings {
+                    name: MachineName::new(&name).unwrap(),
+                    calibration: Calibration {
+                        offsets: Angles::from_array(offsets.map(Microdegrees::new)),
+                    },
+                    networks,
+                    start: StartMode::from_number(start).unwrap(),
+                    access_point: AccessPointName::from_number(access_point).unwrap(),
+                    own_password: own.map(|phrase| Password::new(&phrase).unwrap()),
+                    waves,
+                    button,
+                    map: ZMap::new(map).unwrap(),
+                    shift: NibShift::from_hundredths(shift).unwrap(),
+                    directions: Directions::from_byte(servos).unwrap(),
+                }
             },
         )
 }
@@ -142,7 +156,11 @@ fn the_bytes_of_a_record() {
         \x04\x01\x04\
         \x05\x01\x02\
         \x06\x01\x00\
-        \x10\x02\x02\x07";
+        \x07\x08\x00\xffsecret\
+        \x10\x02\x02\x07\
+        \x18\x08\0\0\x64\0\x2c\x01\x38\xff\
+        \x19\x02\xab\xff\
+        \x1a\x01\x02";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -158,12 +176,18 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
     assert_eq!(settings.button, ButtonDraws::Always(Slot::new(7).unwrap()));
+    let password = settings.own_password.as_ref().unwrap();
+    assert_eq!(password.as_bytes(), b"\x00\xffsecret");
+    assert_eq!(settings.map.corners(), [0, 100, 300, -200]);
+    assert_eq!(settings.shift.hundredths(), -85);
+    assert_eq!(settings.directions.reversed, [false, true, false]);
 }
 
 #[test]
 fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
+        own_password: Password::new(&[0xff; MAX_PASSWORD]),
         ..Settings::default()
     };
     for number in 0..MAX_NETWORKS {
@@ -208,6 +232,13 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x05\x01\x03",
         b"\x06\x01\x02",
         b"\x06\x00",
+        b"\x07\x00",
+        b"\x07\x07seven..",
+        b"\x18\x07\0\0\0\0\0\0\0",
+        b"\x18\x08\0\0\0\0\0\0\xf5\x01",
+        b"\x19\x02\xc9\x00",
+        b"\x19\x01\x00",
+        b"\x1a\x01\x08",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(
