@@ -5,6 +5,7 @@ use core::net::SocketAddr;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Timer};
+use firmware::boards::desktop::air;
 use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::flash::{self, FileFlash};
@@ -65,6 +66,11 @@ struct Serve {
     /// The picture, SVG or PNG, rewritten whenever the arm comes to rest
     #[arg(long, value_name = "FILE", default_value = "drawing.svg")]
     picture: PathBuf,
+    /// Networks that can be joined, a line each: name, password, strength in dBm, separated by tabs
+    ///
+    /// The file is read again when it changes. Without it, the arm is in the computer's own network.
+    #[arg(long, value_name = "FILE")]
+    air: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
@@ -135,7 +141,10 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
         picture: Some(options.picture.clone()),
     };
     let (recorder, servos) = Recorder::start(outputs, data, options.speed == Speed::Max)?;
-    let (house, memory) = house(data, flash)?;
+    if let Some(file) = &options.air {
+        air::read(file).map_err(|error| named(&file.display(), error))?;
+    }
+    let (house, memory) = house(data, flash, options.air.is_none())?;
     let frame = options.common.frame();
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed)).map_err(io::Error::other)?;
 
@@ -146,7 +155,9 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let mut spawned = Ok(());
     clock::run(
         options.speed,
-        |spawner| spawned = serve_clients(spawner, house, memory, servos, frame, listener),
+        |spawner| {
+            spawned = serve_clients(spawner, house, memory, servos, frame, listener, options.air);
+        },
         || STOP.load(Ordering::Relaxed),
     );
     spawned.map_err(io::Error::other)?;
@@ -161,11 +172,12 @@ fn serve_clients(
     servos: RecordedServos,
     frame: Duration,
     listener: &'static Listener,
+    air: Option<PathBuf>,
 ) -> Result<(), SpawnError> {
     static SERVER: Server = Server::new();
     spawner.spawn(arm(house, servos, frame)?);
     spawner.spawn(storage(house, memory)?);
-    spawner.spawn(wifi(house)?);
+    spawner.spawn(wifi(house, air)?);
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(listener, client, house)?);
     }
@@ -191,18 +203,25 @@ async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
         .await;
 }
 
-/// There is no radio here: the network policy runs on one that hears the computer's own network alone.
+/// There is no radio here: the network policy runs on one that hears the computer's own network alone, or
+/// what is in a file.
 #[embassy_executor::task]
-async fn wifi(house: &'static House) {
-    static AIR: Air = Air::new(Pace::INSTANT);
+async fn wifi(house: &'static House, networks: Option<PathBuf>) {
+    static OWN: Air = Air::new(Pace::INSTANT);
+    static SCRIPTED: Air = Air::new(Pace::LIFELIKE);
+    if let Some(file) = networks {
+        let radio = ScriptedRadio::new(&SCRIPTED);
+        let policy = network::run(house, radio, NoAddress);
+        embassy_futures::join::join(policy, air::follow(&SCRIPTED, &file)).await;
+        return;
+    }
     let own = own_network();
-    AIR.put(OnAir {
+    OWN.put(OnAir {
         ssid: own.ssid,
         password: own.password,
         signal_dbm: -30,
     });
-    let radio = ScriptedRadio::new(&AIR);
-    network::run(house, radio, NoAddress).await;
+    network::run(house, ScriptedRadio::new(&OWN), NoAddress).await;
 }
 
 #[embassy_executor::task]
@@ -210,13 +229,17 @@ async fn storage(house: &'static House, memory: Memory<Flash>) {
     house.store.run(memory).await;
 }
 
-/// An arm with what its flash remembers.
-fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<Flash>)> {
+/// An arm with what its flash remembers, in the computer's own network where it is `at_home` and remembers none.
+fn house(
+    data: ArmData,
+    flash: FileFlash,
+    at_home: bool,
+) -> io::Result<(&'static House, Memory<Flash>)> {
     let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
     let mut memory =
         memory.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
     let (mut settings, _) = embassy_futures::block_on(memory.load());
-    if settings.networks.is_empty() {
+    if at_home && settings.networks.is_empty() {
         let _ = settings.networks.put(own_network());
     }
     let house = House::new(data, settings, IDENTITY, VITALS);
@@ -239,7 +262,7 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
         picture: options.picture.clone(),
     };
     let (recorder, servos) = Recorder::start(outputs, data, false)?;
-    let (house, memory) = house(data, FileFlash::in_memory())?;
+    let (house, memory) = house(data, FileFlash::in_memory(), true)?;
     let frame = options.common.frame();
 
     // Nobody watches: time may always jump.
