@@ -1,5 +1,6 @@
 //! The developer's commands.
 
+mod browser;
 mod emulate;
 mod image;
 mod table;
