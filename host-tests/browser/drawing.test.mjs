@@ -7,7 +7,7 @@ import { file, open, says } from './arm.mjs';
 import { distance, length } from './lines.mjs';
 
 const UNITS_PER_MM = 20;
-/** Every kind of shape, nested transforms, and millimetres: 80 x 56 of them. */
+/** Every kind of shape, nested transforms, and millimetres: 60 x 42 of them. */
 const SHAPES = readFileSync(new URL('shapes.svg', import.meta.url), 'utf8');
 
 /** Where the browser itself draws the shapes of an SVG, in millimetres. */
@@ -31,7 +31,7 @@ test('the arm draws what the browser shows', async t => {
   const { arm, page } = await open(t);
   await page.setInputFiles('#file', file('shapes.svg', SHAPES));
   await page.getByRole('button', { name: 'True size' }).click();
-  await says(page, '#size-says', /^80 × 56 mm$/);
+  await says(page, '#size-says', /^60 × 42 mm$/);
   const time = await page.textContent('#fact-time'), inkSaid = parseFloat(await page.textContent('#fact-ink'));
   await page.getByRole('button', { name: 'Draw', exact: true }).click();
   await says(page, '#job-title', /^Finished shapes\.svg$/);
@@ -135,7 +135,7 @@ test('a drawing goes on without its page, and another page shows it', async t =>
 test('a drawing larger than what the arm holds is sent piece by piece', async t => {
   const { arm, page } = await open(t);
   const { limits } = await arm.ask('/api');
-  const points = [...Array(Math.ceil(limits.drawing / 10)).keys()].map(i => `${100 + 90 * Math.cos(i * 2.4)} ${100 + 90 * Math.sin(i * 2.4)}`);
+  const points = [...Array(Math.ceil(limits.drawing / 10)).keys()].map(i => `${100 + 90 * Math.cos(i * 0.3)} ${100 + 90 * Math.sin(i * 0.3)}`);
   await page.setInputFiles('#file', file('large.svg', `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 200 200"><path d="M${points.join('L')}" stroke="#000"/></svg>`));
   await says(page, '#notes', /Larger than what the arm holds .* leave this page open/);
   await page.getByRole('button', { name: 'Draw', exact: true }).click();
@@ -153,7 +153,7 @@ test('G-code is drawn as it is written, and what does not belong there is named'
   await page.getByRole('button', { name: 'Draw', exact: true }).click();
   await says(page, '#job-title', /^Finished line\.gcode$/);
   await arm.until('/api/state', state => !state.moving);
-  const [[[x0, y0]], last] = [arm.ink().filter(line => line.length), arm.ink().at(-1).at(-1)];
+  const ink = arm.ink(), [[[x0, y0]]] = ink, last = ink.at(-1).at(-1);
   for (const [is, was] of [[x0, 1000], [y0, -400], [last[0], 1700], [last[1], -400]]) assert.ok(Math.abs(is - was) < 1, `${[x0, y0]} to ${last}`);
 });
 
