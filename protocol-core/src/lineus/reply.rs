@@ -94,6 +94,13 @@ impl Reply {
         core::str::from_utf8(message.unwrap_or(&self.text)).unwrap_or_default()
     }
 
+    /// Why something was refused, if it says so.
+    pub fn reason(&self) -> Option<&str> {
+        self.message()
+            .strip_prefix("error INFO:\"")?
+            .strip_suffix('"')
+    }
+
     /// Whether it says that something was refused.
     pub const fn is_error(&self) -> bool {
         self.is_error

@@ -69,7 +69,7 @@ pub enum Request {
 }
 
 /// What belongs to one connection: the line being received, scale and origin.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Session {
     lines: LineBuffer,
     transform: Transform,
