@@ -1,8 +1,10 @@
 //! What the arm remembers, and its form in memory.
 
+mod origin;
 mod parts;
 mod record;
 
+pub use origin::{AllowedOrigin, MAX_ORIGIN, Origin};
 pub use record::MAX_RECORD;
 
 use crate::arm::Calibration;
@@ -125,10 +127,12 @@ pub struct Settings {
     pub access_point: AccessPointName,
     /// Whether it makes its little waves (M291).
     pub waves: bool,
+    /// Whose pages may drive the arm through its web interface, beside its own.
+    pub allowed_origin: AllowedOrigin,
 }
 
 impl Default for Settings {
-    /// `line-us`, no calibration, no network, a station that waves.
+    /// `line-us`, no calibration, no network, a station that waves, pages from elsewhere kept out.
     fn default() -> Self {
         Self {
             name: MachineName::default(),
@@ -137,6 +141,7 @@ impl Default for Settings {
             start: StartMode::default(),
             access_point: AccessPointName::default(),
             waves: true,
+            allowed_origin: AllowedOrigin::None,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The desktop arm: the firmware of the drawing arm with sockets, files and a picture.
 
 use clap::{Args, Parser, Subcommand};
-use core::net::SocketAddr;
+use core::net::{AddrParseError, IpAddr, Ipv4Addr, SocketAddr};
+use core::str::FromStr;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Timer};
@@ -18,6 +19,7 @@ use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{Server, serve};
 use firmware::services::network;
 use firmware::services::storage::Memory;
+use firmware::services::web;
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
 use protocol_core::motion::Micros;
@@ -54,6 +56,9 @@ struct Serve {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
+    /// Where browsers find the arm's page: an address, or 'none' [default: 127.0.0.1:8080, where it is free]
+    #[arg(long, value_name = "ADDR")]
+    web: Option<Web>,
     /// Where the arm keeps its name, calibration and network, made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.state")]
     state: PathBuf,
@@ -74,6 +79,29 @@ struct Serve {
     #[command(flatten)]
     common: Common,
 }
+
+/// Where the web interface is.
+#[derive(Clone, Copy)]
+enum Web {
+    Nowhere,
+    At(SocketAddr),
+}
+
+impl FromStr for Web {
+    type Err = AddrParseError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "none" => Ok(Self::Nowhere),
+            address => address.parse().map(Self::At),
+        }
+    }
+}
+
+/// Where the web interface is unless it is told otherwise.
+const WEB: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
+/// Bytes of a drawing that the machine holds.
+const DRAWING: usize = 64 * 1024;
 
 #[derive(Args)]
 struct Draw {
@@ -130,6 +158,7 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let listener = embassy_futures::block_on(Listener::bind(options.line_us))
         .map_err(|error| named(&options.line_us, error))?;
     let listener: &'static Listener = Box::leak(Box::new(listener));
+    let web = listen_for_browsers(options.web)?;
     let flash =
         FileFlash::open(&options.state).map_err(|error| named(&options.state.display(), error))?;
     let data = ArmData {
@@ -150,13 +179,18 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
 
     log::info!("{} is ready.", house.name().as_str());
     log::info!("  Line-us clients: {}", options.line_us);
+    match &web {
+        Some((address, _)) => log::info!("  page:            http://{address}/"),
+        None => log::info!("  page:            none"),
+    }
     log::info!("  picture:         {}", options.picture.display());
     log::info!("  stop with Ctrl-C");
     let mut spawned = Ok(());
     clock::run(
         options.speed,
         |spawner| {
-            spawned = serve_clients(spawner, house, memory, servos, frame, listener, options.air);
+            spawned = serve_clients(spawner, house, memory, servos, frame, listener, options.air)
+                .and_then(|()| web.map_or(Ok(()), |web| serve_browsers(spawner, house, web)));
         },
         || STOP.load(Ordering::Relaxed),
     );
@@ -192,6 +226,55 @@ fn serve_clients(
     #[embassy_executor::task]
     async fn doorman(listener: &'static Listener) {
         SERVER.turn_away(listener).await;
+    }
+}
+
+/// Unless it was asked for, the web interface is where it is free, or not at all.
+fn listen_for_browsers(web: Option<Web>) -> io::Result<Option<(SocketAddr, &'static Listener)>> {
+    let address = match web {
+        None => WEB,
+        Some(Web::At(address)) => address,
+        Some(Web::Nowhere) => return Ok(None),
+    };
+    let bound = embassy_futures::block_on(Listener::bind(address));
+    match bound {
+        Ok(listener) => Ok(Some((address, Box::leak(Box::new(listener))))),
+        Err(error) if web.is_none() => {
+            log::warn!("no page at {address}: {error}");
+            Ok(None)
+        }
+        Err(error) => Err(io::Error::new(error.kind(), format!("{address}: {error}"))),
+    }
+}
+
+fn serve_browsers(
+    spawner: Spawner,
+    house: &'static House,
+    (address, listener): (SocketAddr, &'static Listener),
+) -> Result<(), SpawnError> {
+    static SERVER: web::Server = web::Server::new();
+    let own = Some(address.ip()).filter(|own| !own.is_unspecified());
+    house.address.lock(|place| place.set(own));
+    for client in (0..).map_while(Client::web) {
+        spawner.spawn(worker(listener, client, house)?);
+    }
+    spawner.spawn(doorman(listener)?);
+    spawner.spawn(job(house, vec![0; DRAWING].leak())?);
+    return Ok(());
+
+    #[embassy_executor::task(pool_size = web::CONNECTIONS)]
+    async fn worker(listener: &'static Listener, client: Client, house: &'static House) {
+        SERVER.work(listener, client, house).await;
+    }
+
+    #[embassy_executor::task]
+    async fn doorman(listener: &'static Listener) {
+        SERVER.turn_away(listener).await;
+    }
+
+    #[embassy_executor::task]
+    async fn job(house: &'static House, room: &'static mut [u8]) {
+        house.job.run(house, room).await;
     }
 }
 

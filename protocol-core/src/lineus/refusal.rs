@@ -14,6 +14,8 @@ pub enum Refusal<'a> {
     Words(WordError<'a>),
     /// M997, which this firmware will know, but does not yet.
     NotYet,
+    /// A code that is for other connections than WebSockets.
+    NotHere(u32),
     /// A letter that the command does not have.
     UnknownParameter(char),
     /// A letter that the command needs.
@@ -65,6 +67,7 @@ impl fmt::Display for Refusal<'_> {
             Self::NotYet => {
                 out.write_str("M997 is missing: this firmware cannot update itself yet")
             }
+            Self::NotHere(code) => write!(out, "M{code} is refused over the WebSocket"),
             Self::Missing(letter) => write!(out, "parameter {letter} is missing"),
             Self::UnknownParameter(letter) => write!(out, "unknown parameter {letter}"),
             Self::Repeated(letter) => write!(out, "parameter {letter} is repeated"),

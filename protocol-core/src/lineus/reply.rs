@@ -94,6 +94,13 @@ impl Reply {
         core::str::from_utf8(message.unwrap_or(&self.text)).unwrap_or_default()
     }
 
+    /// Why something was refused, if it says so.
+    pub fn reason(&self) -> Option<&str> {
+        self.message()
+            .strip_prefix("error INFO:\"")?
+            .strip_suffix('"')
+    }
+
     /// Whether it says that something was refused.
     pub const fn is_error(&self) -> bool {
         self.is_error
@@ -128,7 +135,7 @@ impl Reply {
     pub fn report(&mut self, report: &Report) {
         match report {
             Report::Resting => self.ok(),
-            Report::Moving { end, limited } => self.place(*end, limited.map(tell)),
+            Report::Moving { end, limited } => self.place(*end, limited.map(Limited::text)),
         }
     }
 
@@ -313,14 +320,6 @@ impl Reply {
     }
 }
 
-fn tell(limited: Limited) -> &'static str {
-    match limited {
-        Limited::Target { lifted: true } => "out of reach: going to the closest point, pen lifted",
-        Limited::Target { lifted: false } => "out of reach: going to the closest point",
-        Limited::Way => "the way leaves the drawing area: held at its edge",
-    }
-}
-
 const fn mode(own_network: bool) -> &'static str {
     if own_network { "AP" } else { "ST" }
 }
@@ -340,7 +339,8 @@ fn entry_length(ssid: &Ssid) -> usize {
 }
 
 /// What the network is doing, without double quotes.
-struct InWords<'a>(&'a Status);
+#[derive(Clone, Copy, Debug)]
+pub struct InWords<'a>(pub &'a Status);
 
 impl fmt::Display for InWords<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

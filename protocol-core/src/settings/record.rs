@@ -10,6 +10,7 @@
 //! | 4 | what it is after power-on: 1 to 4, as `M552 S` |
 //! | 5 | how its own network is called: 1 or 2, as `M552 P` |
 //! | 6 | waves: 0 or 1 |
+//! | 8 | whose pages may drive the arm: empty, `*`, or an origin |
 //!
 //! How it may change: a new setting gets a new tag. Firmware that does not know the tag skips it, and
 //! where a field is missing, because the record is older than the setting, the setting has its default.
@@ -17,7 +18,9 @@
 //! older firmware would misunderstand: it takes no record of a later version than its own, and every
 //! firmware takes those of all earlier ones. Version 1 was not a record yet: `parts.rs` reads it.
 
-use super::{AccessPointName, MAX_NAME, MachineName, Settings, StartMode};
+use super::{
+    AccessPointName, AllowedOrigin, MAX_NAME, MAX_ORIGIN, MachineName, Settings, StartMode,
+};
 use crate::arm::Calibration;
 use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, Network};
 use heapless::Vec;
@@ -31,6 +34,7 @@ const NETWORK: u8 = 3;
 const START: u8 = 4;
 const ACCESS_POINT: u8 = 5;
 const WAVES: u8 = 6;
+const ALLOWED_ORIGIN: u8 = 8;
 
 /// Tag and length.
 const HEAD: usize = 2;
@@ -39,10 +43,11 @@ pub const MAX_RECORD: usize = 1
     + (HEAD + MAX_NAME)
     + (HEAD + Calibration::BYTES)
     + MAX_NETWORKS * (HEAD + MAX_NETWORK)
-    + 3 * (HEAD + 1);
+    + 3 * (HEAD + 1)
+    + (HEAD + MAX_ORIGIN);
 
 // Lengths are one byte.
-const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255);
+const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255 && MAX_ORIGIN <= 255);
 
 impl Settings {
     /// The record of all settings.
@@ -58,6 +63,8 @@ impl Settings {
         put(&mut record, START, &[self.start.number()]);
         put(&mut record, ACCESS_POINT, &[self.access_point.number()]);
         put(&mut record, WAVES, &[self.waves.into()]);
+        let origin = self.allowed_origin.as_str();
+        put(&mut record, ALLOWED_ORIGIN, origin.as_bytes());
         record
     }
 
@@ -90,6 +97,9 @@ impl Settings {
             (START, &[number]) => self.start = StartMode::from_number(number)?,
             (ACCESS_POINT, &[number]) => self.access_point = AccessPointName::from_number(number)?,
             (WAVES, &[flag @ (0 | 1)]) => self.waves = flag == 1,
+            (ALLOWED_ORIGIN, text) => {
+                self.allowed_origin = AllowedOrigin::new(core::str::from_utf8(text).ok()?)?;
+            }
             _ => return None,
         }
         Some(())

@@ -30,14 +30,16 @@ fn networks() -> impl Strategy<Value = Networks> {
 
 fn settings() -> impl Strategy<Value = Settings> {
     let numbers = (1..=4u8, 1..=2u8, any::<bool>());
+    let origin = prop_oneof!["", "\\*", "https?://[a-z0-9.-]{1,40}(:[0-9]{1,5})?"];
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
+        origin,
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves))| Settings {
+            |(name, offsets, networks, (start, access_point, waves), origin)| Settings {
                 name: MachineName::new(&name).unwrap(),
                 calibration: Calibration {
                     offsets: Angles::from_array(offsets.map(Microdegrees::new)),
@@ -46,6 +48,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 start: StartMode::from_number(start).unwrap(),
                 access_point: AccessPointName::from_number(access_point).unwrap(),
                 waves,
+                allowed_origin: AllowedOrigin::new(&origin).unwrap(),
             },
         )
 }
@@ -97,7 +100,7 @@ proptest! {
     #[test]
     fn tags_of_later_firmware_are_skipped(
         settings in settings(),
-        tag in 7..=255u8,
+        tag in 9..=255u8,
         value in vec(any::<u8>(), 0..=255),
         place: prop::sample::Index,
     ) {
@@ -135,7 +138,8 @@ fn the_bytes_of_a_record() {
         \x03\x05\x04open\
         \x04\x01\x04\
         \x05\x01\x02\
-        \x06\x01\x00";
+        \x06\x01\x00\
+        \x08\x13https://example.org";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -150,12 +154,15 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.start, StartMode::StationLongPress);
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
+    assert_eq!(settings.allowed_origin.as_str(), "https://example.org");
 }
 
 #[test]
 fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
+        allowed_origin: AllowedOrigin::new(&std::format!("http://{}", "x".repeat(MAX_ORIGIN - 7)))
+            .unwrap(),
         ..Settings::default()
     };
     for number in 0..MAX_NETWORKS {
@@ -200,6 +207,8 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x05\x01\x03",
         b"\x06\x01\x02",
         b"\x06\x00",
+        b"\x08\x04null",
+        b"\x08\x01\xff",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(
