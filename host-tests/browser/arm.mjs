@@ -37,7 +37,9 @@ export class Arm {
 
   async switchOn() {
     const options = ['--line-us', `127.0.0.1:${this.lineUs}`, '--web', `127.0.0.1:${this.port}`, '--state', join(this.folder, 'state'),
-      '--picture', this.picture, '--speed', String(this.speed)];
+      '--picture', this.picture, '--speed', String(this.speed),
+      // The pen lifts when a test lifts it.
+      '--lift-after', '3600'];
     if (this.air) options.push('--air', this.air);
     this.process = spawn(program, options, { stdio: ['ignore', 'pipe', 'inherit'] });
     const ended = new Promise((_, failed) => {
