@@ -37,6 +37,7 @@ impl Machine {
             );
         let options = Options {
             line_us: free_address().unwrap(),
+            web: Some(free_address().unwrap()),
             flash: folder.path().join("flash"),
             time,
         };

@@ -29,6 +29,8 @@ const MONITOR: &str = "monitor";
 pub struct Options {
     /// Where this computer's clients connect.
     pub line_us: SocketAddr,
+    /// Where this computer's browsers connect, if they are to.
+    pub web: Option<SocketAddr>,
     /// The flash's file; made, erased, if it does not exist.
     pub flash: PathBuf,
     /// What the machine takes for time.
@@ -194,6 +196,7 @@ pub fn free_address() -> Result<SocketAddr> {
 
 fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
     let [records, console, monitor] = [RECORDS, CONSOLE, MONITOR].map(|name| folder.join(name));
+    let line_us = options.line_us;
     let mut qemu = machine(firmware, options.time);
     qemu.args(["-serial", "none"])
         .arg("-monitor")
@@ -214,7 +217,10 @@ fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
         ])
         .args(["-device", "virtconsole,bus=c1.0,chardev=console"])
         .arg("-netdev")
-        .arg(format!("user,id=n0,hostfwd=tcp:{}-:1337", options.line_us))
+        .arg(match options.web {
+            Some(web) => format!("user,id=n0,hostfwd=tcp:{line_us}-:1337,hostfwd=tcp:{web}-:80"),
+            None => format!("user,id=n0,hostfwd=tcp:{line_us}-:1337"),
+        })
         .args(["-device", "virtio-net-device,netdev=n0"])
         .arg("-drive")
         .arg(format!(

@@ -69,6 +69,9 @@ struct Emulate {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
+    /// Where browsers on this computer connect
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
+    web: SocketAddr,
     /// The machine's flash, kept between runs; made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.flash")]
     flash: PathBuf,
