@@ -26,8 +26,8 @@ pub fn test(setup: bool) -> Result<()> {
         "--silent",
     ]))?;
     run(Command::new("node")
-        .current_dir(root())
-        .args(["--test", "firmware/web/test"]))?;
+        .current_dir(root().join("firmware/web"))
+        .arg("--test"))?;
     run(Command::new("node")
         .current_dir(&tests)
         .args(["--test", "--test-concurrency=1"])
