@@ -1,4 +1,4 @@
-// Pictures of the page with an arm that draws: node pictures.mjs FOLDER
+// Pictures of the page with an arm that draws, one of which is in the documentation: node pictures.mjs FOLDER
 
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
