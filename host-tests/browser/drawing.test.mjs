@@ -158,6 +158,15 @@ test('G-code is drawn as it is written, and what does not belong there is named'
   for (const [is, was] of [[x0, 1000], [y0, -400], [last[0], 1700], [last[1], -400]]) assert.ok(Math.abs(is - was) < 1, `${[x0, y0]} to ${last}`);
 });
 
+test('a long line grows with the pen', async t => {
+  const { page } = await open(t, { speed: 0.5 });
+  await page.setInputFiles('#file', file('line.gcode', 'G1 Z300\nG1 X1000 Y-800\n'));
+  await page.getByRole('button', { name: 'Draw', exact: true }).click();
+  const reached = () => page.waitForFunction(() => /^M1000 1000L1000 [\d-]/.test(document.querySelector('#wet').getAttribute('d')) && +document.querySelector('#wet').getAttribute('d').split(' ')[2]);
+  const first = await (await reached()).jsonValue();
+  await page.waitForFunction(first => +document.querySelector('#wet').getAttribute('d').split(' ')[2] < first, first);
+});
+
 test('what is no drawing is refused in words', async t => {
   const { page } = await open(t);
   for (const [name, text, words] of [['a.svg', '<svg', /damaged/], ['b.svg', '<svg xmlns="http://www.w3.org/2000/svg"><text>x</text></svg>', /nothing in it that a pen can draw: 1 text/], ['c.txt', 'hello', /nothing in it/]]) {

@@ -60,6 +60,8 @@ enum Task {
         #[arg(long)]
         csv: bool,
     },
+    /// Run the tests of the page that the arm serves, in a browser too
+    Page,
     /// Run everything that must pass: format, lints, documentation, tests, emulator, images
     Test,
 }
@@ -115,6 +117,7 @@ fn perform(cli: Cli) -> Result<()> {
             table::bench(&bench::measure(setup)?, csv);
             Ok(())
         }
+        Task::Page => browser::test(setup),
         Task::Test => test::everything(setup),
     }
 }
