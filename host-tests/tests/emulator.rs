@@ -46,6 +46,7 @@ impl Machine {
             );
         let options = Options {
             line_us: free_address().unwrap(),
+            web: Some(free_address().unwrap()),
             flash: folder.path().join("flash"),
             time,
             serial,

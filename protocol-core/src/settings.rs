@@ -1,8 +1,10 @@
 //! What the arm remembers, and its form in memory.
 
+mod origin;
 mod parts;
 mod record;
 
+pub use origin::{AllowedOrigin, MAX_ORIGIN, Origin};
 pub use record::MAX_RECORD;
 
 use crate::arm::{Calibration, Compensation, Directions, NibShift, ZMap};
@@ -133,6 +135,8 @@ pub struct Settings {
     pub shift: NibShift,
     /// Which servos turn the other way (M280).
     pub directions: Directions,
+    /// Whose pages may drive the arm through its web interface, beside its own.
+    pub allowed_origin: AllowedOrigin,
 }
 
 impl Settings {
@@ -143,7 +147,8 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// `line-us`, no calibration, no network, its own one open, a station that waves, on flat paper.
+    /// `line-us`, no calibration, no network, its own one open, a station that waves, on flat paper, pages
+    /// from elsewhere kept out.
     fn default() -> Self {
         Self {
             name: MachineName::default(),
@@ -156,6 +161,7 @@ impl Default for Settings {
             map: ZMap::FLAT,
             shift: NibShift::NONE,
             directions: Directions::default(),
+            allowed_origin: AllowedOrigin::None,
         }
     }
 }

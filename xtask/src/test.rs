@@ -37,6 +37,7 @@ pub fn everything(setup: bool) -> Result<()> {
     step("tests", || {
         run(cargo().args(["test", "--workspace", "--locked"]))
     })?;
+    step("page", || crate::browser::test(setup))?;
     step("fuzzing", fuzz)?;
     step("lints for the chips", || {
         Board::Virt.lint(&["virt", "echo", "bench"], &["bench"], setup)?;

@@ -3,6 +3,7 @@
 pub mod arm;
 pub mod dhcp;
 pub mod discovery;
+pub mod job;
 pub mod line_us;
 pub mod names;
 pub mod network;
@@ -10,17 +11,21 @@ pub mod panel;
 pub mod portal;
 pub mod serial;
 pub mod storage;
+pub mod web;
 
 use crate::board::Vitals;
 use arm::Arm;
-use core::cell::RefCell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::cell::{Cell, RefCell};
+use core::net::IpAddr;
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use discovery::Discovery;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Duration, Instant, Timer};
+use job::Job;
 use network::Wifi;
 use panel::Panel;
+use protocol_core::arm::Calibration;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, Machine};
 use protocol_core::motion::WAVE;
@@ -39,6 +44,12 @@ pub struct House {
     pub discovery: Discovery,
     /// Light and button.
     pub panel: Panel,
+    /// The drawing that the machine draws by itself.
+    pub job: Job,
+    /// Line-us clients that are connected.
+    pub clients: AtomicU8,
+    /// Under which the machine can be reached, if it knows.
+    pub address: Mutex<CriticalSectionRawMutex, Cell<Option<IpAddr>>>,
     /// Who this machine is.
     pub identity: Identity,
     /// How it is.
@@ -60,6 +71,9 @@ impl House {
             wifi: Wifi::new(),
             discovery: Discovery::new(),
             panel: Panel::new(),
+            job: Job::new(),
+            clients: AtomicU8::new(0),
+            address: Mutex::new(Cell::new(None)),
             identity,
             vitals,
             settings: Mutex::new(RefCell::new(settings)),
@@ -133,6 +147,17 @@ impl House {
             self.put_in_force(new);
         }
         Ok(answer)
+    }
+
+    /// Makes the place where the arm rests the calibration point, or removes the calibration.
+    async fn calibrate(&self, here: bool, client: Client) -> Result<(), StoreError> {
+        let calibrate = |settings: &mut Settings| {
+            settings.calibration = match here {
+                true => self.arm.with(|machine| machine.calibration_here()),
+                false => Calibration::default(),
+            };
+        };
+        self.change(client, calibrate).await
     }
 
     fn put_in_force(&self, new: Settings) {

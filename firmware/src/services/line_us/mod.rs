@@ -6,11 +6,12 @@
 mod answers;
 mod perform;
 
+pub(super) use answers::Answers;
 pub use answers::PATIENCE;
+pub(super) use perform::perform;
 
 use super::House;
 use crate::log::info;
-use answers::Answers;
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use core::sync::atomic::{AtomicU8, Ordering};
 use edge_nal::{Close, TcpAccept, TcpShutdown};
@@ -20,7 +21,6 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
-use perform::perform;
 use protocol_core::lineus::{Reply, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 
@@ -60,14 +60,14 @@ impl Server {
                 Timer::after_millis(10).await;
                 continue;
             };
-            self.count(1);
+            self.count(1, house);
             info!("client {} connected", peer);
             house.greet_first_client().await;
             serve(&mut socket, client, house).await;
             // It may be gone already; then there is nothing to close.
             let _ = with_timeout(FAREWELL, socket.close(Close::Both)).await;
             info!("client {} left", peer);
-            self.count(-1);
+            self.count(-1, house);
         }
     }
 
@@ -88,11 +88,12 @@ impl Server {
         }
     }
 
-    fn count(&self, change: i8) {
+    fn count(&self, change: i8, house: &House) {
         // Workers share one executor: nobody comes in between.
         let busy = self.busy.load(Ordering::Relaxed);
-        self.busy
-            .store(busy.saturating_add_signed(change), Ordering::Relaxed);
+        let busy = busy.saturating_add_signed(change);
+        self.busy.store(busy, Ordering::Relaxed);
+        house.clients.store(busy, Ordering::Relaxed);
         self.changed.signal(());
     }
 }
@@ -114,7 +115,7 @@ async fn farewell<S: Read + Write + TcpShutdown>(socket: &mut S) -> Result<(), S
 pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     let mut session = Session::new();
     let mut reply = Reply::new();
-    let mut answers = Answers::new(socket);
+    let mut answers: Answers<_> = Answers::new(socket);
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
