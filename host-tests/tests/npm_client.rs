@@ -8,7 +8,8 @@ use std::process::{Command, Output};
 /// The client as it is on npm.
 const PACKAGE: &str = "@beardicus/line-us@2.1.0";
 /// What has to be on the computer, and cannot be had from cargo.
-const NEEDS: &str = "This test needs Node.js, npm, and the npm registry; on Debian: apt install nodejs npm";
+const NEEDS: &str =
+    "This test needs Node.js, npm, and the npm registry; on Debian: apt install nodejs npm";
 
 /// A folder with the client, made once and kept in the target folder.
 fn modules() -> PathBuf {
