@@ -8,11 +8,16 @@ use xtask::toolchain::require;
 /// Programs, and Debian's packages that have them.
 const NEEDS: [(&str, &str); 3] = [("node", "nodejs"), ("npm", "npm"), ("chromium", "chromium")];
 
+/// Makes sure that what the tests of the page need is there; the npm client's test needs a part of it.
+pub fn require_programs(setup: bool) -> Result<()> {
+    NEEDS
+        .into_iter()
+        .try_for_each(|(program, package)| require(program, package, setup))
+}
+
 /// Runs all tests of the page.
 pub fn test(setup: bool) -> Result<()> {
-    for (program, package) in NEEDS {
-        require(program, package, setup)?;
-    }
+    require_programs(setup)?;
     let tests = root().join("host-tests/browser");
     run(own_cargo()
         .current_dir(root())

@@ -1,7 +1,7 @@
 //! A client of the web interface: requests byte by byte, so that wrong ones can be made as well.
 
 use serde_json::Value;
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -171,6 +171,41 @@ impl Web {
             Ok((socket, _)) => Ok(WebSocket(socket)),
             Err(tungstenite::HandshakeError::Failure(error)) => Err(error),
             Err(other) => panic!("{other}"),
+        }
+    }
+}
+
+const UPGRADE: &str = "Host: line-us.local\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+    Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+
+impl Web {
+    /// So many connections at once, each of which does something that it should not, then says no more.
+    /// Returns when all of them are answered or closed.
+    ///
+    /// # Panics
+    /// When one of them is not.
+    pub fn crowd(self, size: usize) {
+        let live = format!("GET /api/live HTTP/1.1\r\n{UPGRADE}");
+        let gcode = format!("GET / HTTP/1.1\r\n{UPGRADE}\u{1}\u{2}\u{3}");
+        let headers = format!("GET / HTTP/1.1\r\n{}", "A: b\r\n".repeat(30));
+        let long = format!("GET / HTTP/1.1\r\nA: {}\r\n\r\n", "x".repeat(10_000));
+        let page = "GET / HTTP/1.1\r\n\r\n";
+        let words = ["", "G", page, &live, &gcode, &headers, &long];
+        let streams: Vec<_> = (0..size)
+            .map(|number| {
+                let mut stream = self.connect();
+                // It may be turned away before it has said anything.
+                let _ = stream.write_all(words[number % words.len()].as_bytes());
+                stream
+            })
+            .collect();
+        for mut stream in streams {
+            let _ = stream.shutdown(Shutdown::Write);
+            let mut answer = Vec::new();
+            if let Err(error) = stream.read_to_end(&mut answer) {
+                // Reset, but not forgotten.
+                assert_eq!(error.kind(), ErrorKind::ConnectionReset, "{error}");
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::arm;
 use flate2::read::GzDecoder;
-use host_tests::desktop::{Desktop, Web};
+use host_tests::desktop::{Desktop, Web, wait_until};
 use serde_json::json;
 use std::io::Read;
 
@@ -10,6 +10,7 @@ use std::io::Read;
 fn the_machine_and_its_state() {
     let (arm, _folder) = arm(&[]);
     let web = arm.web();
+    wait_until("the network", || web.state()["light"] == "blue");
     let machine = web.get("/api").json();
     assert_eq!(machine["name"], "line-us");
     assert_eq!(machine["home"], json!({"x": 1000, "y": 1000, "z": 1000}));
