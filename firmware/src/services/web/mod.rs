@@ -30,6 +30,8 @@ mod request;
 mod settings;
 mod state;
 
+pub use page::PAGE_SIZE;
+
 use super::House;
 use crate::log::info;
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
