@@ -4,6 +4,11 @@
 //! are done as any client's. What is held is bounded; a larger drawing comes in pieces while the arm draws.
 //! `docs/api.md` is the contract.
 
+#![allow(
+    clippy::result_large_err,
+    reason = "there is no heap: why a line is refused is carried as it is"
+)]
+
 mod draw;
 mod forecast;
 mod hold;

@@ -22,7 +22,7 @@ pub struct Asker<'a> {
 }
 
 /// Whether who asks may; says whether it is a page from elsewhere.
-pub fn check(asker: &Asker<'_>, owner: &Owner<'_>, _path: &str) -> Result<bool, Refused> {
+pub fn check(asker: &Asker<'_>, owner: &Owner<'_>) -> Result<bool, Refused> {
     if let Some(host) = asker.host
         && !is_own(host, owner)
     {
@@ -110,7 +110,7 @@ mod tests {
             host: some(host),
             origin: some(origin),
         };
-        check(&asker, &owner, "/").map_err(|refused| match refused {
+        check(&asker, &owner).map_err(|refused| match refused {
             Refused::Redirect(_) => 302,
             Refused::Failure(failure) => failure.status.0,
         })

@@ -8,6 +8,12 @@
 //! 0.8, were looked at first: the one adds a `Content-Length` to its own position without a check, the other
 //! unwraps it, so that one header of a stranger would end the firmware.
 
+#![allow(
+    clippy::result_large_err,
+    clippy::large_enum_variant,
+    reason = "there is no heap: why a request is refused is carried as it is"
+)]
+
 mod access;
 mod api;
 mod by_hand;
@@ -23,6 +29,8 @@ mod query;
 mod request;
 mod settings;
 mod state;
+
+pub use page::PAGE_SIZE;
 
 use super::House;
 use crate::log::info;

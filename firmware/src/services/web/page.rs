@@ -8,7 +8,9 @@ use embedded_io_async::{Read, Write};
 static PAGE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/index.html.gz"));
 /// Most that it may take of a chip's flash.
 const MAX_PAGE: usize = 40 * 1024;
-const _: () = assert!(PAGE.len() <= MAX_PAGE, "the page is too large");
+/// Bytes that it takes of flash.
+pub const PAGE_SIZE: usize = PAGE.len();
+const _: () = assert!(PAGE_SIZE <= MAX_PAGE, "the page is too large");
 
 /// A tag that is another one for every other page, in quotes.
 pub const TAG: &str = env!("QUILL_PAGE_TAG");

@@ -131,7 +131,7 @@ impl Request {
             host: headers.once("host")?,
             origin: headers.once("origin")?,
         };
-        let from_elsewhere = access::check(&asker, owner, path)?;
+        let from_elsewhere = access::check(&asker, owner)?;
         let length = length(&headers)?;
         let accept = accept(&headers)?;
         let what = route(method, path, accept.is_some())?;
