@@ -174,6 +174,7 @@ impl Bench {
             Request::Capabilities => reply.capabilities(&self.name, false),
             Request::Diagnostics => reply.diagnostics(&Diagnostics {
                 name: &self.name,
+                host: None,
                 identity: IDENTITY,
                 uptime: Micros::new(self.next_us),
                 position: self.machine.position(),
@@ -200,7 +201,9 @@ impl Bench {
             Request::Start => reply.start(&Settings::default()),
             Request::Waves => reply.waves(true),
             Request::Networks => reply.networks(&[], &Networks::new()),
+            Request::OwnNetwork => reply.own_network(&Settings::default()),
             Request::SetStart { .. }
+            | Request::ProtectOwnNetwork(_)
             | Request::SetWaves(_)
             | Request::Remember { .. }
             | Request::Forget(_)

@@ -1,11 +1,14 @@
 //! The firmware on the chip's instruction set, in QEMU, with everything around it real: sockets, a disk
 //! that survives, and servos of which every pulse is read back.
 
-use host_tests::desktop::{Client, draw};
+use host_tests::desktop::serial::SerialPort;
+use host_tests::desktop::{Client, draw, wait_until};
+use host_tests::lasaur::host::LasaurApp;
+use protocol_core::lasaur::BANNER;
 use protocol_core::motion::PEN_UP;
 use std::collections::BTreeSet;
 use std::fs;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
@@ -31,6 +34,11 @@ impl Machine {
     }
 
     fn boot_in(folder: TempDir, time: Time) -> Self {
+        Self::boot_with(folder, time, None)
+    }
+
+    /// A machine with something at the other end of its serial line.
+    fn boot_with(folder: TempDir, time: Time, serial: Option<String>) -> Self {
         let firmware = std::env::var_os("QUILL_VIRT_FIRMWARE")
             .map(PathBuf::from)
             .expect(
@@ -40,6 +48,7 @@ impl Machine {
             line_us: free_address().unwrap(),
             flash: folder.path().join("flash"),
             time,
+            serial,
         };
         let mut emulator = Emulator::boot(&firmware, &options).unwrap();
         emulator.wait_ready().unwrap();
@@ -380,6 +389,42 @@ impl Machine {
 }
 
 #[test]
+fn the_machine_is_found_by_its_name_and_follows_it() {
+    let machine = Machine::boot(Time::Wall);
+    wait_until("line-us.local to be found", || {
+        address_of(&machine, b"\x07line-us\x05local\0") == Some([10, 0, 2, 15])
+    });
+    let mut client = machine.client();
+    let renamed = client.say("M550 Probs-lineus");
+    assert_eq!(renamed, "ok MACHINENAME:robs-lineus");
+    wait_until("robs-lineus.local to be found", || {
+        address_of(&machine, b"\x0brobs-lineus\x05local\0") == Some([10, 0, 2, 15])
+    });
+    assert!(client.say("M122").contains(" Host:robs-lineus.local "));
+    assert_eq!(address_of(&machine, b"\x07line-us\x05local\0"), None);
+}
+
+/// Asks once for the address behind a name, as a program does that knows nothing of multicast (RFC 6762,
+/// section 6.7).
+fn address_of(machine: &Machine, name: &[u8]) -> Option<[u8; 4]> {
+    let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+    socket.connect(machine.address).unwrap();
+    let patience = Duration::from_millis(500);
+    socket.set_read_timeout(Some(patience)).unwrap();
+    let header = [0xab, 0xcd, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0];
+    let question = [&header, name, &[0, 1, 0, 1]].concat();
+    socket.send(&question).unwrap();
+    let mut answer = [0; 1500];
+    let length = socket.recv(&mut answer).ok()?;
+    // Type, class, ten seconds, four bytes; then the address.
+    let record = [name, &[0, 1, 0, 1, 0, 0, 0, 10, 0, 4]].concat();
+    let at = answer[..length]
+        .windows(record.len())
+        .position(|bytes| bytes == record)?;
+    answer[at + record.len()..].first_chunk().copied()
+}
+
+#[test]
 fn a_panic_is_told_and_ends_the_machine_with_a_status() {
     let mut machine = Machine::boot(Time::Wall);
     machine.emulator.say("panic").unwrap();
@@ -424,4 +469,128 @@ fn no_frame_is_late_or_missing_while_two_clients_flood() {
         "{} frames, {moving} in motion, none missing, none late",
         frames.len()
     );
+}
+
+/// A machine, and the other end of its serial line since before it was switched on.
+fn boot_with_serial() -> (Machine, SerialPort) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("tcp:{},nodelay=on", listener.local_addr().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let machine = Machine::boot_with(folder, Time::Wall, Some(line));
+    let mut port = SerialPort::over_tcp(listener.accept().unwrap().0);
+    assert_eq!(port.line(), BANNER.trim_end());
+    (machine, port)
+}
+
+fn queue(host: &mut LasaurApp, port: &mut SerialPort, lines: &[&str]) -> Vec<String> {
+    host.lines.clear();
+    lines.iter().for_each(|line| host.queue(line));
+    port.serve(host);
+    host.lines.clone()
+}
+
+#[test]
+fn laser_software_runs_a_job_over_the_serial_line() {
+    let (mut machine, mut port) = boot_with_serial();
+    let mut host = LasaurApp::default();
+    assert_eq!(queue(&mut host, &mut port, &["!"]), ["!R"; 2]);
+    assert_eq!(queue(&mut host, &mut port, &["~", "G30"]), [""; 4]);
+    machine.frames();
+    let job = [
+        "G90",
+        "M80",
+        "G0F8000",
+        "G1F3000",
+        "S255",
+        "G00X10.000Y10.000",
+        "G01X30.000Y10.000",
+        "G01X30.000Y25.000",
+        "G01X10.000Y25.000",
+        "G01X10.000Y10.000",
+        "M81",
+        "S0",
+        "G0X0Y0F8000",
+    ];
+    assert_eq!(queue(&mut host, &mut port, &job), [""; 26]);
+    port.wait_for_place("X5.000Y5.000V");
+    // The last frame may not have been read.
+    let mut frames = Vec::new();
+    let home = (710 + 100, -900 + 100);
+    while frames.last().is_none_or(|frame: &Frame| {
+        let there = frame.set_point.position;
+        (there.x.rounded(), there.y.rounded()) != home || there.z != PEN_UP
+    }) || frames.len() < 100
+    {
+        frames.extend(machine.frames());
+        thread::sleep(Duration::from_millis(20));
+    }
+    // Corners of the square, in drawing units, the offset included: the pen is down at each.
+    let corners = [(1010, -600), (1410, -600), (1410, -300), (1010, -300)];
+    for corner in corners {
+        let drawn = frames.iter().any(|frame| {
+            let there = frame.set_point.position;
+            let aside = f64::hypot(
+                there.x.to_f64() - f64::from(corner.0),
+                there.y.to_f64() - f64::from(corner.1),
+            );
+            // A frame at 50 mm/s is 10 units.
+            there.pen_is_down() && aside < 10.0
+        });
+        assert!(drawn, "{corner:?} was not drawn");
+    }
+    let air: Vec<bool> = frames
+        .iter()
+        .map(|frame| frame.set_point.outputs[0])
+        .collect();
+    let on = air.iter().position(|on| *on).unwrap();
+    let off = air.iter().rposition(|on| *on).unwrap();
+    assert!(air[on..off].iter().all(|on| *on) && !air[air.len() - 1]);
+    let drawing = |frame: &Frame| frame.set_point.position.pen_is_down();
+    assert!(on <= frames.iter().position(drawing).unwrap());
+    // Off at the end of the last stroke, where the pen then rises.
+    let end = frames[off].set_point.position;
+    let (x, y) = (f64::from(corners[0].0), f64::from(corners[0].1));
+    let aside = f64::hypot(end.x.to_f64() - x, end.y.to_f64() - y);
+    assert!(aside < 5.0, "{end:?}");
+}
+
+#[test]
+fn door_chiller_and_power_are_told_over_the_serial_line() {
+    let (mut machine, mut port) = boot_with_serial();
+    let mut told = |line: &str, reply: &str| {
+        machine.emulator.say(line).unwrap();
+        for _ in 0..500 {
+            if port.say("G90") == reply {
+                return;
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+        panic!("{line:?} is not answered {reply:?}");
+    };
+    told("door open", "D");
+    told("chiller off", "DC");
+    told("door closed", "C");
+    told("power off", "!PCP");
+    told("chiller on", "!PP");
+    told("power on", "!P");
+    port.send("~");
+    assert_eq!(port.say("G90"), "");
+}
+
+#[test]
+fn a_stop_over_the_serial_line_reaches_an_arm_that_others_move() {
+    let (machine, mut port) = boot_with_serial();
+    let mut client = machine.client();
+    assert!(client.say("G94 S1").starts_with("ok"));
+    assert!(client.say("G01 X1900 Y0 Z0").starts_with("ok "));
+    port.send("!");
+    assert_eq!(port.say("?"), "!R");
+    assert!(
+        client
+            .say("G28")
+            .starts_with("error INFO:\"the machine is stopped")
+    );
+    port.send("~");
+    assert_eq!(port.say("G90"), "");
+    assert!(client.say("G28").starts_with("ok "));
 }

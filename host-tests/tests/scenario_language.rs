@@ -200,11 +200,24 @@ fn the_radio_does_what_it_does() {
         "the machine opens \"Mine\"",
         "the machine opens \"Line-us-Setup\"",
     );
+    fails_after(
+        setup,
+        "the machine opens \"Line-us-Setup\", password \"correct horse\"",
+        "the machine opens \"Line-us-Setup\"",
+    );
     fails(
         "the machine opens \"Line-us-Setup\"",
         "the machine opens no network",
     );
     fails("the machine closes its network", "it stays open");
+    fails(
+        "the machine is found as \"other\"",
+        "it is found as line-us",
+    );
+    fails(
+        "the machine is found as \"line-us\"\nthe machine is not found",
+        "it is found as line-us",
+    );
     fails("the machine joins \"home\"", "the machine tries no network");
     let told = "network \"home\" up, password \"correct horse\"\nA sends M587 Shome P\"wrong horse\"\nA hears ok\n";
     fails(

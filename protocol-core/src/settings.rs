@@ -6,7 +6,7 @@ mod record;
 pub use record::MAX_RECORD;
 
 use crate::arm::{Calibration, Compensation, Directions, NibShift, ZMap};
-use crate::wifi::Networks;
+use crate::wifi::{Networks, Password};
 use heapless::String;
 
 /// Longest machine name, in bytes.
@@ -123,6 +123,8 @@ pub struct Settings {
     pub start: StartMode,
     /// How its own network is called (M552).
     pub access_point: AccessPointName,
+    /// Password of its own network, which is open without one (M589). Never shown.
+    pub own_password: Option<Password>,
     /// Whether it makes its little waves (M291).
     pub waves: bool,
     /// How high the paper lies (G31).
@@ -141,7 +143,7 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// `line-us`, no calibration, no network, a station that waves, on flat paper.
+    /// `line-us`, no calibration, no network, its own one open, a station that waves, on flat paper.
     fn default() -> Self {
         Self {
             name: MachineName::default(),
@@ -149,6 +151,7 @@ impl Default for Settings {
             networks: Networks::new(),
             start: StartMode::default(),
             access_point: AccessPointName::default(),
+            own_password: None,
             waves: true,
             map: ZMap::FLAT,
             shift: NibShift::NONE,

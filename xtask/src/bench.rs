@@ -154,6 +154,7 @@ fn round_trip(program: &Path) -> Result<u64> {
         line_us: free_address()?,
         flash: folder.path().join("flash.img"),
         time: Time::Instructions,
+        serial: None,
     };
     let mut emulator = Emulator::boot(program, &options)?;
     emulator.wait_ready()?;

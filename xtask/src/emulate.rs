@@ -21,6 +21,9 @@ pub fn emulate(options: Emulate, setup: bool) -> Result<()> {
         line_us: options.line_us,
         flash: options.flash,
         time: Time::Wall,
+        serial: options
+            .serial_tcp
+            .map(|address| format!("tcp:{address},server=on,wait=off,nodelay=on")),
     };
     let outputs = Outputs {
         trace: options.trace,

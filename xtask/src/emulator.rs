@@ -33,6 +33,8 @@ pub struct Options {
     pub flash: PathBuf,
     /// What the machine takes for time.
     pub time: Time,
+    /// What is at the other end of its serial line, as QEMU's `-serial` takes it; nothing if `None`.
+    pub serial: Option<String>,
 }
 
 /// What an emulated machine takes for time.
@@ -195,7 +197,7 @@ pub fn free_address() -> Result<SocketAddr> {
 fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
     let [records, console, monitor] = [RECORDS, CONSOLE, MONITOR].map(|name| folder.join(name));
     let mut qemu = machine(firmware, options.time);
-    qemu.args(["-serial", "none"])
+    qemu.args(["-serial", options.serial.as_deref().unwrap_or("none")])
         .arg("-monitor")
         .arg(format!("unix:{},server=on,wait=off", monitor.display()))
         .arg("-chardev")
@@ -214,7 +216,11 @@ fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
         ])
         .args(["-device", "virtconsole,bus=c1.0,chardev=console"])
         .arg("-netdev")
-        .arg(format!("user,id=n0,hostfwd=tcp:{}-:1337", options.line_us))
+        .arg(format!(
+            // Its name service is asked at the same number, which is another port with UDP.
+            "user,id=n0,hostfwd=tcp:{address}-:1337,hostfwd=udp:{address}-:5353",
+            address = options.line_us
+        ))
         .args(["-device", "virtio-net-device,netdev=n0"])
         .arg("-drive")
         .arg(format!(

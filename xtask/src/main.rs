@@ -76,6 +76,9 @@ struct Emulate {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
+    /// Where laser software connects to the serial line, over TCP
+    #[arg(long, value_name = "ADDR")]
+    serial_tcp: Option<SocketAddr>,
     /// The machine's flash, kept between runs; made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.flash")]
     flash: PathBuf,

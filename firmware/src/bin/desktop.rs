@@ -11,13 +11,14 @@ use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::draw_lasaur::{self, Listener as Replies, Sender};
 use firmware::boards::desktop::flash::{self, FileFlash};
-use firmware::boards::desktop::net::Listener;
+use firmware::boards::desktop::net::{Listener, Multicast};
 use firmware::boards::desktop::pty::{self, Pty};
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
 use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS, own_network};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::discovery::{self, Ports};
 use firmware::services::line_us::{Server, serve};
 use firmware::services::network;
 use firmware::services::serial::{self, ReadError};
@@ -64,6 +65,12 @@ struct Serve {
     /// The serial port over TCP instead
     #[arg(long, value_name = "ADDR")]
     serial_tcp: Option<SocketAddr>,
+    /// Announce the arm by name, so that clients find it without an address
+    ///
+    /// On the network of the address where clients connect: on this computer alone, unless that is another
+    /// one.
+    #[arg(long)]
+    mdns: bool,
     /// Where the arm keeps its name, calibration and network, made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.state")]
     state: PathBuf,
@@ -144,6 +151,11 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
         .map_err(|error| named(&options.line_us, error))?;
     let listener: &'static Listener = Box::leak(Box::new(listener));
     let (port, _link) = serial_port(&options)?;
+    let multicast = options
+        .mdns
+        .then(|| Multicast::beside(options.line_us.ip()))
+        .transpose()
+        .map_err(|error| named(&"--mdns", error))?;
     let flash =
         FileFlash::open(&options.state).map_err(|error| named(&options.state.display(), error))?;
     let data = ArmData {
@@ -174,7 +186,13 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
         options.speed,
         |spawner| {
             spawned = serve_clients(spawner, house, memory, servos, frame, listener)
-                .and_then(|()| serve_port(spawner, port, house));
+                .and_then(|()| serve_port(spawner, port, house))
+                .and_then(|()| {
+                    if let Some(multicast) = multicast {
+                        spawner.spawn(discovery(house, multicast, options.line_us.port())?);
+                    }
+                    Ok(())
+                });
         },
         || STOP.load(Ordering::Relaxed),
     );
@@ -288,6 +306,12 @@ async fn wifi(house: &'static House) {
     });
     let radio = ScriptedRadio::new(&AIR);
     network::run(house, radio, NoAddress).await;
+}
+
+#[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast, line_us: u16) {
+    let ports = Ports { line_us, web: None };
+    discovery::run(house, &multicast, || Some(multicast.address()), ports).await;
 }
 
 #[embassy_executor::task]

@@ -7,17 +7,22 @@ use edge_nal::TcpBind;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Ticker};
 use firmware::board::Vitals;
+use firmware::boards::embassy_udp::Multicast;
 use firmware::boards::esp::data::BOARD;
 use firmware::boards::esp::flash::FlashPartition;
+use firmware::boards::esp::inputs::Inputs;
 use firmware::boards::esp::light::Light;
 use firmware::boards::esp::net::{Connections, Net, NetRunner};
 use firmware::boards::esp::radio::EspRadio;
+use firmware::boards::esp::serial::{SerialRx, SerialTx};
 use firmware::boards::esp::servos::{FRAME, ServoPorts};
 use firmware::boards::esp::start::{self, Network, Parts};
 use firmware::boards::esp::system::Watchdog;
 use firmware::boards::esp::{Button, last_panic, pwm_timer, system};
 use firmware::services::House;
-use firmware::services::line_us::{ANYWHERE, Server};
+use firmware::services::discovery::{self, Ports};
+use firmware::services::line_us::{ANYWHERE, PORT, Server};
+use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
 use firmware::services::{network, panel};
 use protocol_core::machine::{Client, MAX_CLIENTS};
@@ -69,13 +74,16 @@ fn spawn(
     spawner.spawn(storage(house, memory)?);
     spawner.spawn(light(house, parts.light)?);
     spawner.spawn(button(house, parts.button)?);
-    // `parts.serial` is open; the dialect of the serial port attaches here.
+    if let Some(port) = parts.serial {
+        spawner.spawn(serial(house, port, parts.inputs)?);
+    }
     let Some(Network { radio, net, runner }) = parts.network else {
         defmt::error!("no network: the radio does not start");
         house.panel.show(Lamp::Error);
         return Ok(());
     };
     let tcp = net.connections();
+    spawner.spawn(discovery(house, net.multicast())?);
     spawner.spawn(network_stack(runner)?);
     spawner.spawn(wifi(house, radio, net)?);
     for client in (0..).map_while(Client::new) {
@@ -132,6 +140,15 @@ async fn button(house: &'static House, button: Button) {
 }
 
 #[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast) {
+    let ports = Ports {
+        line_us: PORT,
+        web: None,
+    };
+    discovery::run(house, &multicast, || multicast.address(), ports).await;
+}
+
+#[embassy_executor::task]
 async fn network_stack(mut runner: NetRunner) {
     runner.run().await;
 }
@@ -139,6 +156,13 @@ async fn network_stack(mut runner: NetRunner) {
 #[embassy_executor::task]
 async fn wifi(house: &'static House, radio: EspRadio, net: Net) {
     network::run(house, radio, net).await;
+}
+
+/// Laser software at the other end of a wire, of which nobody knows whether there is anybody.
+#[embassy_executor::task]
+async fn serial(house: &'static House, port: (SerialRx, SerialTx), mut inputs: Inputs) {
+    let (from, to) = port;
+    serve(from, to, ReadError::ByteLost, &mut inputs, house).await;
 }
 
 /// Feeds the watchdog as long as the servo tick lives, and this executor, and tells of frames that

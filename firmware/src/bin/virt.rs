@@ -9,17 +9,22 @@ use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_time::{Duration, Timer};
 use firmware::boards::SETTINGS;
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
+use firmware::boards::embassy_udp::Multicast;
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::boards::virt::flash::Flash;
 use firmware::boards::virt::net::VirtNet;
+use firmware::boards::virt::uart::{Receiver, Transmitter};
 use firmware::boards::virt::world::button::Button;
+use firmware::boards::virt::world::inputs::Inputs;
 use firmware::boards::virt::world::light::Light;
 use firmware::boards::virt::world::servos::Servos;
 use firmware::boards::virt::world::{Lines, Recorder};
 use firmware::boards::virt::{self, Wired, executor};
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
+use firmware::services::discovery::{self, Ports};
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
+use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
 use firmware::services::{network, panel};
 use protocol_core::lineus::Identity;
@@ -32,6 +37,7 @@ const FRAME: Duration = Duration::from_millis(10);
 const CONNECTIONS: usize = MAX_CLIENTS + 1;
 const BUFFER: usize = 2048;
 
+type SerialPort = (Receiver, Transmitter);
 type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
 
 /// Never returns.
@@ -44,7 +50,8 @@ fn main() -> ! {
         let started = devices.and_then(|devices| {
             spawner.spawn(records(devices.recorder).ok()?);
             spawner.spawn(host_lines(devices.lines).ok()?);
-            spawner.spawn(boot(spawner, tick, devices.card, devices.disk).ok()?);
+            let (card, disk, serial) = (devices.card, devices.disk, devices.serial);
+            spawner.spawn(boot(spawner, tick, card, disk, serial).ok()?);
             Some(())
         });
         if started.is_none() {
@@ -56,7 +63,13 @@ fn main() -> ! {
 
 /// Reads the settings, then starts everything else.
 #[embassy_executor::task]
-async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtNet, disk: Flash) {
+async fn boot(
+    spawner: Spawner,
+    tick: embassy_executor::SendSpawner,
+    card: VirtNet,
+    disk: Flash,
+    port: SerialPort,
+) {
     let Some(memory) = Memory::new(disk, SETTINGS) else {
         log::error!("the settings do not lie in whole pages");
         return;
@@ -84,7 +97,11 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         identity,
         virt::VITALS,
     ));
-    if start(spawner, tick, house, memory, card).is_err() {
+    let started = serial(house, port).map(|task| spawner.spawn(task));
+    if started
+        .and_then(|()| start(spawner, tick, house, memory, card))
+        .is_err()
+    {
         log::error!("a task does not fit");
     }
 }
@@ -96,7 +113,7 @@ fn start(
     memory: &'static mut Memory<Flash>,
     card: VirtNet,
 ) -> Result<(), SpawnError> {
-    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
+    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 3 }>> = StaticCell::new();
     static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; CONNECTIONS]> =
         ConstStaticCell::new([const { Buffers::new() }; _]);
     static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
@@ -111,6 +128,7 @@ fn start(
         embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
     spawner.spawn(network_stack(runner)?);
     spawner.spawn(tell_address(stack)?);
+    spawner.spawn(discovery(house, Multicast::new(stack))?);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(tcp, client, house)?);
@@ -144,6 +162,12 @@ async fn servo_tick(house: &'static House) {
 }
 
 #[embassy_executor::task]
+async fn serial(house: &'static House, port: SerialPort) {
+    let (from, to) = port;
+    serve(from, to, ReadError::ByteLost, &mut Inputs, house).await;
+}
+
+#[embassy_executor::task]
 async fn storage(house: &'static House, memory: &'static mut Memory<Flash>) {
     house.store.run(memory).await;
 }
@@ -170,6 +194,15 @@ async fn wifi(house: &'static House) {
 #[embassy_executor::task]
 async fn network_stack(mut runner: Runner<'static, VirtNet>) {
     runner.run().await;
+}
+
+#[embassy_executor::task]
+async fn discovery(house: &'static House, multicast: Multicast) {
+    let ports = Ports {
+        line_us: PORT,
+        web: None,
+    };
+    discovery::run(house, &multicast, || multicast.address(), ports).await;
 }
 
 #[embassy_executor::task]

@@ -4,6 +4,8 @@
 pub mod desktop;
 #[cfg(feature = "embassy-tcp")]
 pub mod embassy_tcp;
+#[cfg(feature = "embassy-tcp")]
+pub mod embassy_udp;
 #[cfg(feature = "esp")]
 pub mod esp;
 #[cfg(any(feature = "desktop", feature = "virt"))]

@@ -2,9 +2,12 @@
 
 pub mod arm;
 pub mod dhcp;
+pub mod discovery;
 pub mod line_us;
+pub mod names;
 pub mod network;
 pub mod panel;
+pub mod portal;
 pub mod serial;
 pub mod storage;
 
@@ -12,6 +15,7 @@ use crate::board::Vitals;
 use arm::Arm;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
+use discovery::Discovery;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Duration, Instant, Timer};
@@ -31,6 +35,8 @@ pub struct House {
     pub store: Store,
     /// The network to be in.
     pub wifi: Wifi,
+    /// How the machine is found.
+    pub discovery: Discovery,
     /// Light and button.
     pub panel: Panel,
     /// Who this machine is.
@@ -52,6 +58,7 @@ impl House {
             arm: Arm::new(machine),
             store: Store::new(),
             wifi: Wifi::new(),
+            discovery: Discovery::new(),
             panel: Panel::new(),
             identity,
             vitals,
@@ -132,6 +139,7 @@ impl House {
         let (calibration, directions) = (new.calibration, new.directions);
         let (map, shift, compensation) = (new.map, new.shift, new.compensation());
         let old = self.settings.lock(|settings| settings.replace(new));
+        self.discovery.renamed();
         self.arm.with(|machine| {
             if old.calibration != calibration {
                 machine.set_calibration(calibration);

@@ -7,9 +7,8 @@ use super::House;
 use crate::board::{Address, Radio};
 use crate::log::{info, warning};
 use core::cell::RefCell;
-use core::cmp::Reverse;
 use core::pin::pin;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_futures::join::join;
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::Mutex;
@@ -51,6 +50,8 @@ pub struct Wifi {
     heard: Mutex<CriticalSectionRawMutex, RefCell<Vec<Heard, MAX_HEARD>>>,
     /// The radio has time to listen.
     idle: AtomicBool,
+    /// Networks that were joined or opened so far.
+    connection: AtomicU32,
     listed: Signal<CriticalSectionRawMutex, ()>,
 }
 
@@ -73,6 +74,7 @@ impl Wifi {
             })),
             heard: Mutex::new(RefCell::new(Vec::new())),
             idle: AtomicBool::new(false),
+            connection: AtomicU32::new(0),
             listed: Signal::new(),
         }
     }
@@ -80,6 +82,17 @@ impl Wifi {
     /// What the network is doing.
     pub fn status(&self) -> Status {
         self.status.lock(|status| status.borrow().clone())
+    }
+
+    /// Another number for each time that a network was joined, or the own one opened.
+    pub fn connection(&self) -> u32 {
+        self.connection.load(Ordering::Relaxed)
+    }
+
+    fn connected(&self) {
+        // Nobody else writes it.
+        let connection = self.connection().wrapping_add(1);
+        self.connection.store(connection, Ordering::Relaxed);
     }
 
     /// Whether the machine is on its own network, for setup.
@@ -233,6 +246,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                         Joined::Yes => {
                             info!("network joined");
                             self.address.ask();
+                            self.house.wifi.connected();
                             self.is_joined = true;
                         }
                         Joined::NotFound => warning!("network not found"),
@@ -267,14 +281,13 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                     Either::Second(input) => Some(input),
                 }
             }
-            Job::Open(name) => {
-                let own = Network {
-                    ssid: name.clone(),
-                    password: None,
-                };
-                self.is_open = self.radio.open_access_point(&own).await.is_ok();
+            Job::Open(own) => {
+                self.is_open = self.radio.open_access_point(own).await.is_ok();
                 match self.is_open {
-                    true => info!("setup network opened"),
+                    true => {
+                        self.house.wifi.connected();
+                        info!("setup network opened");
+                    }
                     false => warning!("setup network not opened"),
                 }
                 self.on(Event::Opened(self.is_open));
@@ -289,7 +302,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                         Either::Second(Input::List) => {
                             let scan = self.radio.scan(&mut self.heard);
                             let _ = select(&mut serving, scan).await;
-                            keep_heard(&mut self.heard, &self.house.wifi);
+                            keep_heard(&self.heard, &self.house.wifi);
                             self.house.wifi.listed.signal(());
                             continue;
                         }
@@ -342,13 +355,12 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
         }
     }
 
-    fn keep_heard(&mut self) {
-        keep_heard(&mut self.heard, &self.house.wifi);
+    fn keep_heard(&self) {
+        keep_heard(&self.heard, &self.house.wifi);
     }
 }
 
-/// Strongest first, and remembered for whoever asks.
-fn keep_heard(heard: &mut Vec<Heard, MAX_HEARD>, wifi: &Wifi) {
-    heard.sort_unstable_by_key(|network| Reverse(network.signal_dbm));
+/// For whoever asks.
+fn keep_heard(heard: &Vec<Heard, MAX_HEARD>, wifi: &Wifi) {
     wifi.heard.lock(|kept| kept.borrow_mut().clone_from(heard));
 }

@@ -143,11 +143,12 @@ impl<'a> Port<'a> {
         }
     }
 
-    /// Takes over the inputs; without power the arm stops.
+    /// Takes over the inputs; without power the arm stops, and stays so.
     fn sense(&mut self, sensors: Sensors) {
-        let power_fails = sensors.power_off && !self.sensors.power_off;
+        let fails = sensors.power_off && !self.sensors.power_off;
         self.sensors = sensors;
-        if power_fails {
+        let goes_on = || self.arm.with(|machine| machine.stopped().is_none());
+        if fails || (sensors.power_off && goes_on()) {
             self.arm.stop(StopReason::Power);
         }
     }
@@ -172,7 +173,7 @@ impl<'a> Port<'a> {
     fn happen(&mut self, effect: Effect) {
         match effect {
             Effect::Stop(reason) => self.arm.stop(reason),
-            Effect::Resume if self.sensors.power_off => self.arm.stop(StopReason::Power),
+            Effect::Resume if self.sensors.power_off => {}
             Effect::Resume => self.arm.with(Machine::resume),
         }
     }

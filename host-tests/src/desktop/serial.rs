@@ -44,7 +44,14 @@ impl SerialPort {
     /// # Panics
     /// When nobody listens.
     pub fn connect(address: SocketAddr) -> Self {
-        let wire = TcpStream::connect(address).expect("the arm takes a connection");
+        Self::over_tcp(TcpStream::connect(address).expect("the arm takes a connection"))
+    }
+
+    /// Over a connection that somebody made.
+    ///
+    /// # Panics
+    /// When it has no options.
+    pub fn over_tcp(wire: TcpStream) -> Self {
         let options = wire.set_nodelay(true);
         let options = options.and_then(|()| wire.set_nonblocking(true));
         options.expect("a connection has options");

@@ -90,18 +90,25 @@ pub enum Expectation {
     Light(Pattern),
     LightStays(Pattern, Duration),
     LightWasNever(Hue),
-    Opens(Ssid),
+    Opens(Ssid, Option<Password>),
     ClosesItsNetwork,
     Tries(Ssid, Outcome),
     MayTry(Ssid),
     TriesNothing(Duration),
+    /// By this name, without `.local`; by none.
+    IsFound(Option<String>),
     Remembers(Remembered),
     PowerIsOff,
     ArmWaves,
     ArmRests(Option<[i32; 3]>),
     ArmStays(Duration),
-    Pen { down: bool },
-    PenStays { down: bool, time: Duration },
+    Pen {
+        down: bool,
+    },
+    PenStays {
+        down: bool,
+        time: Duration,
+    },
     NibPasses(f64, f64, Option<f64>),
 }
 

@@ -235,13 +235,20 @@ fn expectation(words: &mut Words<'_>) -> Found<Expectation> {
 
 fn machine(words: &mut Words<'_>) -> Result<Expectation, String> {
     Ok(if words.eat("opens") {
-        Expectation::Opens(ssid(words)?)
+        let ssid = ssid(words)?;
+        let password = words.eat("password").then(|| password(words)).transpose()?;
+        Expectation::Opens(ssid, password)
     } else if words.eat("closes its network") {
         Expectation::ClosesItsNetwork
     } else if words.eat("joins") {
         Expectation::Tries(ssid(words)?, Outcome::Joined)
     } else if words.eat("does not find") {
         Expectation::Tries(ssid(words)?, Outcome::NotFound)
+    } else if words.eat("is found as") {
+        let host = words.text()?;
+        Expectation::IsFound(Some(String::from_utf8_lossy(&host).into_owned()))
+    } else if words.eat("is not found") {
+        Expectation::IsFound(None)
     } else if words.eat("is refused by") {
         Expectation::Tries(ssid(words)?, Outcome::Refused)
     } else if words.eat("fails to join") {

@@ -5,7 +5,7 @@ use super::command::{Action, ClientAction, Kept, Memory, Network};
 use crate::scripted::Board;
 use crate::scripted::journal::note;
 use crate::scripted::light::{Hue, Pattern};
-use crate::scripted::radio::shown;
+use crate::scripted::radio::{offered, shown};
 use embassy_time::{Duration, Instant};
 use firmware::boards::scripted_radio::OnAir;
 use protocol_core::wifi::Ssid;
@@ -270,8 +270,8 @@ impl Stage {
             return Some(left_over);
         }
         let opened = self.board.radio.opened.borrow();
-        if let Some(ssid) = opened.front() {
-            return Some(format!("the machine opens {}", shown(ssid)));
+        if let Some(own) = opened.front() {
+            return Some(format!("the machine opens {}", offered(own)));
         }
         let tries = self.board.radio.tries.borrow();
         if let Some((ssid, outcome)) = tries.front() {

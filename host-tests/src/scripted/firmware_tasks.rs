@@ -5,13 +5,16 @@ use super::button::Button;
 use super::flash::{Cells, Flash, SIZE};
 use super::light::Light;
 use super::power::Power;
-use super::radio::{RecordedAddress, RecordedRadio};
+use super::quiet::Quiet;
+use super::radio::{RadioRecord, RecordedAddress, RecordedRadio};
 use super::tcp::Acceptor;
 use super::{Board, FRAME};
 use firmware::board::Vitals;
+use firmware::boards::scripted_radio::Air;
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
-use firmware::services::line_us::Server;
+use firmware::services::discovery::{self, Ports};
+use firmware::services::line_us::{PORT, Server};
 use firmware::services::storage::Memory;
 use firmware::services::{network, panel};
 use protocol_core::lineus::Identity;
@@ -67,6 +70,15 @@ pub fn start(board: &Board, reason: &'static str) {
         spawner.spawn(async move { panel::watch(&served, devices.button).await });
         let served = house.clone();
         spawner.spawn(async move { network::run(&served, devices.radio, devices.address).await });
+        let served = house.clone();
+        spawner.spawn(async move {
+            let ports = Ports {
+                line_us: PORT,
+                web: None,
+            };
+            let address = || devices.network.address(&devices.air);
+            discovery::run(&served, &Quiet, address, ports).await
+        });
         let server = Rc::new(Server::new());
         let acceptor = Rc::new(devices.acceptor);
         for client in (0..).map_while(Client::new) {
@@ -83,6 +95,8 @@ struct Devices {
     button: Button,
     radio: RecordedRadio,
     address: RecordedAddress,
+    network: Rc<RadioRecord>,
+    air: Rc<Air>,
     acceptor: Acceptor,
 }
 
@@ -102,6 +116,8 @@ impl Devices {
             button: Button::new(board.button.clone()),
             radio: RecordedRadio::new(board.air.clone(), board.radio.clone(), power()),
             address: RecordedAddress(board.radio.clone()),
+            network: board.radio.clone(),
+            air: board.air.clone(),
             acceptor: Acceptor {
                 port: board.port.clone(),
                 power: power(),

@@ -8,6 +8,7 @@ pub mod flash;
 pub mod journal;
 pub mod light;
 pub mod power;
+pub mod quiet;
 pub mod radio;
 pub mod tasks;
 pub mod tcp;
@@ -60,6 +61,13 @@ pub struct Board {
 }
 
 impl Board {
+    /// The name under which the machine is found, without `.local`.
+    pub fn found_as(&self) -> Option<String> {
+        let house = self.house.borrow();
+        let host = house.as_ref()?.discovery.host()?;
+        Some(host.as_str().into())
+    }
+
     /// A new machine in its box: nothing stored, no power. Time begins at 0, and belongs to this thread.
     pub fn new() -> Self {
         Self {

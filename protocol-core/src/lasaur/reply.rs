@@ -31,7 +31,7 @@ pub const BANNER: &str = concat!("# LasaurGrbl ", env!("CARGO_PKG_VERSION"), "-q
 
 /// Follows the line whose checksum is none.
 const NO_CHECKSUM: &str = " -> checksum outside [128,255]";
-/// Longest reply: a whole line, [`NO_CHECKSUM`], all sensors, newline.
+/// Longest reply: a whole line, why its checksum is none, all sensors, newline.
 pub const MAX_REPLY: usize = MAX_LINE + NO_CHECKSUM.len() + 3 + 4 * 2 + 1;
 
 /// What the board can sense; an input that is not there is never set.

@@ -9,7 +9,7 @@ use crate::motion::{
     Coordinate, MAX_COORDINATE, MAX_SCALE, Micros, StepRange, StepSize, Transform,
 };
 use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
-use crate::text::Words;
+use crate::text::{Text, Words};
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Password, Ssid};
 
 /// A valid command, its numbers as written: not yet scaled, not yet limited.
@@ -62,6 +62,10 @@ pub enum Command {
         /// How its own network is called.
         name: Option<AccessPointName>,
     },
+    /// M589.
+    OwnNetwork,
+    /// `M589 P`: the password of the machine's own network, `None` for an open one.
+    ProtectOwnNetwork(Option<Password>),
     /// M291.
     Waves,
     /// `M291 S1`, `M291 S2`.
@@ -159,6 +163,7 @@ fn other_than_a_move<'a>(
         (b'M', 552) => start(&mut words),
         (b'M', 587) => network(&mut words),
         (b'M', 588) => forget(&mut words),
+        (b'M', 589) => own_network(&mut words),
         (b'M', 997) => Err(Refusal::NotYet),
         _ => Err(Words::new(line).unknown().into()),
     }
@@ -320,11 +325,7 @@ fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         letters.once(letter)?;
         match letter {
             'S' => ssid = Some(network_name(words)?),
-            'P' => {
-                let phrase = words.text(letter)?.unescape::<MAX_PASSWORD>();
-                let phrase = phrase.and_then(|phrase| Password::new(&phrase));
-                password = Some(phrase.ok_or(Refusal::BadPassword)?);
-            }
+            'P' => password = Some(network_password(&words.text(letter)?)?),
             _ => return Err(Refusal::UnknownParameter(letter)),
         }
     }
@@ -348,6 +349,28 @@ fn forget<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
+}
+
+/// M589 is where RepRap firmware has the password of a machine's own network.
+fn own_network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    match words.letter()? {
+        None => Ok(Command::OwnNetwork),
+        Some('P') => {
+            let text = words.text('P')?;
+            let password = match text.raw() {
+                [] => None,
+                _ => Some(network_password(&text)?),
+            };
+            without_parameters(words, Command::ProtectOwnNetwork(password))
+        }
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn network_password<'a>(text: &Text<'a>) -> Result<Password, Refusal<'a>> {
+    text.unescape::<MAX_PASSWORD>()
+        .and_then(|phrase| Password::new(&phrase))
+        .ok_or(Refusal::BadPassword)
 }
 
 fn network_name<'a>(words: &mut Words<'a>) -> Result<Ssid, Refusal<'a>> {
@@ -381,6 +404,7 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
                 Command::Angles
                     | Command::ClearCalibration
                     | Command::Rename(_)
+                    | Command::ProtectOwnNetwork(_)
                     | Command::SetWaves(_)
                     | Command::Forget(_)
                     | Command::ForgetAll

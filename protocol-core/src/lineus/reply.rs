@@ -45,6 +45,8 @@ impl Identity {
 pub struct Diagnostics<'a> {
     /// The machine's name.
     pub name: &'a MachineName,
+    /// The name under which it is found, without `.local`; `None` where it is not.
+    pub host: Option<&'a str>,
     /// Who it is.
     pub identity: Identity,
     /// Time since it started.
@@ -171,6 +173,15 @@ impl Reply {
         ));
     }
 
+    /// Whether its own network takes a password, which is not told.
+    pub fn own_network(&mut self, settings: &Settings) {
+        let password = match settings.own_password {
+            Some(_) => "set",
+            None => "none",
+        };
+        self.compose(format_args!("ok PASSWORD:{password}"));
+    }
+
     /// Whether the machine waves.
     pub fn waves(&mut self, on: bool) {
         self.compose(format_args!("ok S:{}", if on { 1 } else { 2 }));
@@ -248,11 +259,12 @@ impl Reply {
         let [turn_s, turn_e, turn_p] = numbers(state.directions);
         let (map, shift) = (state.compensation.map(), state.compensation.shift());
         self.compose(format_args!(
-            "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
+            "ok name:{}{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
              ZMap:{map} NibShift:{shift} Servos:{turn_s},{turn_e},{turn_p} WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
              Memory:\"{}\"{}",
             state.name.as_str(),
+            Host(state.host),
             state.identity.serial(),
             Uptime(state.uptime),
             x.rounded(),
@@ -402,6 +414,17 @@ impl fmt::Display for Degrees {
         let sign = if hundredths < 0 { "-" } else { "" };
         let magnitude = hundredths.unsigned_abs();
         write!(out, "{sign}{}.{:02}", magnitude / 100, magnitude % 100)
+    }
+}
+
+struct Host<'a>(Option<&'a str>);
+
+impl fmt::Display for Host<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(host) => write!(out, " Host:{host}.local"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -640,6 +663,7 @@ mod tests {
         let text = said(|reply| {
             reply.diagnostics(&Diagnostics {
                 name: &longest,
+                host: Some("abcdefghijklmnopqrstuvwxyz012345-9999"),
                 identity: Identity { mac: [0xff; 6] },
                 uptime: Micros::new(u64::MAX),
                 position: Position::from_units(-1950, -1950, 1000),

@@ -49,6 +49,11 @@ pub enum Request {
         /// How its own network is called.
         name: Option<AccessPointName>,
     },
+    /// To be answered by [`Reply::own_network`].
+    OwnNetwork,
+    /// The password of the machine's own network, `None` for an open one; to be remembered, and answered by
+    /// [`Reply::ok`].
+    ProtectOwnNetwork(Option<Password>),
     /// To be answered by [`Reply::waves`].
     Waves,
     /// To be remembered, and answered by [`Reply::ok`].
@@ -163,6 +168,8 @@ fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Repl
         Command::Name => Request::Name,
         Command::Rename(name) => Request::Rename(name.clone()),
         Command::Start => Request::Start,
+        Command::OwnNetwork => Request::OwnNetwork,
+        Command::ProtectOwnNetwork(password) => Request::ProtectOwnNetwork(password.clone()),
         Command::SetStart { mode, name } => Request::SetStart {
             mode: *mode,
             name: *name,
@@ -340,6 +347,10 @@ mod tests {
             ("M552 P3", "P must be a whole number, 1 to 2"),
             ("M552 S1 S2", "parameter S is repeated"),
             ("M552 X1", "unknown parameter X"),
+            ("M589 S1", "unknown parameter S"),
+            ("M589 Pseven..", "P must be 8 to 63 bytes"),
+            ("M589 P", "P has no value"),
+            ("M589 P\"\" P\"\"", "parameter P is repeated"),
             ("M291 S3", "S must be a whole number, 1 to 2"),
             ("M291 S", "S has no number"),
             ("M291 S1 S1", "parameter S is repeated"),
@@ -501,6 +512,12 @@ mod tests {
             ("M552 S3", set(Some(StartMode::AccessPointLocked), None)),
             ("M552 S4.0", set(Some(StartMode::StationLongPress), None)),
             ("M552 P1", set(None, Some(AccessPointName::Setup))),
+            ("M589", Request::OwnNetwork),
+            (
+                "M589 P\"correct horse\"",
+                Request::ProtectOwnNetwork(Password::new(b"correct horse")),
+            ),
+            ("M589 P\"\"", Request::ProtectOwnNetwork(None)),
             ("M291", Request::Waves),
             ("M291 S1", Request::SetWaves(true)),
             ("M291 S2", Request::SetWaves(false)),

@@ -10,6 +10,7 @@
 //! | 4 | what it is after power-on: 1 to 4, as `M552 S` |
 //! | 5 | how its own network is called: 1 or 2, as `M552 P` |
 //! | 6 | waves: 0 or 1 |
+//! | 7 | password of its own network; no field where that is open |
 //! | 24 | map of heights: top left, top right, bottom right, bottom left, little-endian units of Z |
 //! | 25 | how far the nib moves as it comes down: little-endian hundredths of a millimetre |
 //! | 26 | servos that turn the other way: a bit for shoulder, elbow and pen |
@@ -22,7 +23,7 @@
 
 use super::{AccessPointName, MAX_NAME, MachineName, Settings, StartMode};
 use crate::arm::{Calibration, Directions, NibShift, ZMap};
-use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, Network};
+use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, MAX_PASSWORD, Network, Password};
 use heapless::Vec;
 
 /// Version of the record.
@@ -34,6 +35,7 @@ const NETWORK: u8 = 3;
 const START: u8 = 4;
 const ACCESS_POINT: u8 = 5;
 const WAVES: u8 = 6;
+const OWN_PASSWORD: u8 = 7;
 const MAP: u8 = 24;
 const SHIFT: u8 = 25;
 const DIRECTIONS: u8 = 26;
@@ -46,6 +48,7 @@ pub const MAX_RECORD: usize = 1
     + (HEAD + Calibration::BYTES)
     + MAX_NETWORKS * (HEAD + MAX_NETWORK)
     + 3 * (HEAD + 1)
+    + (HEAD + MAX_PASSWORD)
     + (HEAD + ZMap::BYTES)
     + (HEAD + 2)
     + (HEAD + 1);
@@ -67,6 +70,9 @@ impl Settings {
         put(&mut record, START, &[self.start.number()]);
         put(&mut record, ACCESS_POINT, &[self.access_point.number()]);
         put(&mut record, WAVES, &[self.waves.into()]);
+        if let Some(password) = &self.own_password {
+            put(&mut record, OWN_PASSWORD, password.as_bytes());
+        }
         put(&mut record, MAP, &self.map.to_bytes());
         put(&mut record, SHIFT, &self.shift.hundredths().to_le_bytes());
         put(&mut record, DIRECTIONS, &[self.directions.to_byte()]);
@@ -102,6 +108,7 @@ impl Settings {
             (START, &[number]) => self.start = StartMode::from_number(number)?,
             (ACCESS_POINT, &[number]) => self.access_point = AccessPointName::from_number(number)?,
             (WAVES, &[flag @ (0 | 1)]) => self.waves = flag == 1,
+            (OWN_PASSWORD, phrase) => self.own_password = Some(Password::new(phrase)?),
             (MAP, bytes) => self.map = ZMap::from_bytes(bytes.try_into().ok()?)?,
             (SHIFT, bytes) => {
                 let hundredths = i16::from_le_bytes(bytes.try_into().ok()?);

@@ -11,7 +11,6 @@ use super::{Heard, Joined, MAX_NETWORKS, Network, Networks, SETUP_SSID, Ssid};
 use crate::motion::Micros;
 use crate::panel::{Gesture, Lamp};
 use crate::settings::{AccessPointName, Settings, StartMode};
-use core::cmp::Reverse;
 use core::fmt::Write;
 use heapless::{String, Vec};
 
@@ -58,8 +57,8 @@ pub enum Job<'a> {
     Stay,
     /// Nothing until then.
     Pause(Micros),
-    /// Open the machine's own network, without a password.
-    Open(&'a Ssid),
+    /// Open the machine's own network.
+    Open(&'a Network),
     /// Keep it open.
     Host,
 }
@@ -112,7 +111,7 @@ enum State {
     /// Setup: listening for others who are in setup.
     LookingAround,
     /// Setup: opening the own network.
-    Opening(Ssid),
+    Opening(Network),
     /// Setup: the own network is open.
     Hosting,
     /// Setup: the own network could not be opened; once more later.
@@ -163,7 +162,7 @@ impl Policy {
             State::Joining(network) | State::Trying(network) => Job::Join(network),
             State::Waiting(until) | State::Failed(until) => Job::Pause(*until),
             State::Connected(_) => Job::Stay,
-            State::Opening(name) => Job::Open(name),
+            State::Opening(own) => Job::Open(own),
             State::Hosting => Job::Host,
         }
     }
@@ -294,8 +293,10 @@ impl Policy {
             }
             State::LookingAround => {
                 // A radio that cannot listen may yet be able to talk.
-                let name = self.own_name(settings, heard.unwrap_or_default());
-                self.state = State::Opening(name);
+                self.state = State::Opening(Network {
+                    ssid: self.own_name(settings, heard.unwrap_or_default()),
+                    password: settings.own_password.clone(),
+                });
             }
             _ => {}
         }
@@ -443,14 +444,15 @@ fn order(heard: &[Heard], networks: &Networks) -> Vec<Ssid, MAX_NETWORKS> {
         let same = heard.iter().filter(|other| other.ssid == network.ssid);
         same.map(|other| other.signal_dbm).max()
     };
-    // Absent is less than any strength.
-    let mut order: Vec<_, MAX_NETWORKS> = networks
-        .iter()
-        .enumerate()
-        .map(|(place, network)| (Reverse(strength(network)), place, &network.ssid))
-        .collect();
-    order.sort_unstable_by_key(|(strength, place, _)| (*strength, *place));
-    order.iter().map(|(.., ssid)| (*ssid).clone()).collect()
+    // Put in place one by one: eight are not worth the 10 kB of a library's sorting. Absent is less than
+    // any strength, and there are as many places as networks.
+    let mut order = Vec::<_, MAX_NETWORKS>::new();
+    for network in networks.iter() {
+        let strength = strength(network);
+        let place = order.iter().position(|(other, _)| *other < strength);
+        let _ = order.insert(place.unwrap_or(order.len()), (strength, &network.ssid));
+    }
+    order.iter().map(|(_, ssid)| (*ssid).clone()).collect()
 }
 
 #[cfg(test)]

@@ -3,8 +3,11 @@
 use super::interface::{self, Interfaces, Side};
 use crate::board::Address;
 use crate::boards::embassy_tcp::{Buffers, Pool, Tcp};
+use crate::boards::embassy_udp::Multicast;
 use crate::services::dhcp::{self, MAX_PACKET, OWN_ADDRESS, OWN_PREFIX};
+use crate::services::names;
 use edge_nal_embassy::{Udp, UdpBuffers};
+use embassy_futures::join::join;
 use embassy_net::{Config, ConfigV4, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
 use esp_hal::rng::Rng;
 use protocol_core::machine::MAX_CLIENTS;
@@ -12,13 +15,15 @@ use static_cell::StaticCell;
 
 /// Line-us connections: the clients, and the one that is told that there are too many.
 pub const CONNECTIONS: usize = MAX_CLIENTS + 1;
-/// Sockets: the connections, the DHCP client, the DHCP server.
-const SOCKETS: usize = CONNECTIONS + 2;
+/// Services for guests, each with a socket: addresses and names.
+const FOR_GUESTS: usize = 2;
+/// Sockets: the connections, the services for guests, the DHCP client, discovery.
+const SOCKETS: usize = CONNECTIONS + FOR_GUESTS + 2;
 /// Buffer of a connection in bytes, in each direction: a segment of Ethernet.
 const BUFFER: usize = 1536;
 /// The connections.
 pub type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
-/// DHCP requests that may wait to be read.
+/// Requests of guests that may wait to be read, for each service.
 const REQUESTS: usize = 4;
 
 /// The stack's own task: run it for ever.
@@ -37,7 +42,8 @@ impl Net {
     /// When it is called twice.
     pub(super) fn start(interfaces: Interfaces) -> (Self, NetRunner) {
         static RESOURCES: StaticCell<StackResources<SOCKETS>> = StaticCell::new();
-        static UDP: StaticCell<UdpBuffers<1, MAX_PACKET, MAX_PACKET, REQUESTS>> = StaticCell::new();
+        static UDP: StaticCell<UdpBuffers<FOR_GUESTS, MAX_PACKET, MAX_PACKET, REQUESTS>> =
+            StaticCell::new();
 
         let rng = Rng::new();
         let seed = u64::from(rng.random()) << 32 | u64::from(rng.random());
@@ -62,6 +68,14 @@ impl Net {
         let buffers = BUFFERS.init_with(|| [const { Buffers::new() }; CONNECTIONS]);
         Tcp::new(self.stack, POOL.init(Pool::new(buffers)))
     }
+
+    /// The socket for discovery.
+    ///
+    /// # Panics
+    /// When it is called twice.
+    pub fn multicast(&self) -> Multicast {
+        Multicast::new(self.stack)
+    }
 }
 
 impl Address for Net {
@@ -77,6 +91,9 @@ impl Address for Net {
             gateway: None,
             dns_servers: Default::default(),
         }));
-        dhcp::serve(&self.udp).await
+        let addresses = dhcp::serve(&self.udp);
+        join(addresses, names::serve(&self.udp, names::ANYWHERE))
+            .await
+            .0
     }
 }

@@ -3,6 +3,7 @@
 use super::Button;
 use super::data::BOARD;
 use super::flash::{self, FlashPartition};
+use super::inputs::Inputs;
 use super::interface::Interfaces;
 use super::light::{Light, PwmPower};
 use super::net::{Net, NetRunner};
@@ -41,6 +42,8 @@ pub struct Parts {
     pub button: Button,
     /// G-code from the computer; `None` if the port could not be opened.
     pub serial: Option<(SerialRx, SerialTx)>,
+    /// Door, chiller and power, as far as the board has them.
+    pub inputs: Inputs,
     /// Flash for the settings; `None` if the partition table has no such place.
     pub settings: Option<FlashPartition>,
     /// Radio and network stack; `None` if they could not be started.
@@ -78,6 +81,7 @@ pub fn parts() -> Parts {
             pin(BOARD.elbow.pin),
             pin(BOARD.pen.pin),
         ],
+        outputs: BOARD.outputs.map(|output| output.map(pin)),
         power,
     };
 
@@ -102,6 +106,7 @@ pub fn parts() -> Parts {
         light: Light::new(&BOARD.light, chip.RMT, power),
         button: Input::new(pin(BOARD.button_pin), pull_up),
         serial: serial.ok(),
+        inputs: Inputs::open(),
         settings,
         network,
         watchdog: Watchdog::new(timers.wdt),

@@ -39,6 +39,14 @@ pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client
             };
             change("start mode", set, reply, client, house).await;
         }
+        Request::OwnNetwork => house.settings(|settings| reply.own_network(settings)),
+        Request::ProtectOwnNetwork(password) => {
+            let set = |settings: &mut Settings| {
+                settings.own_password = password.clone();
+                Ok(())
+            };
+            change("password", set, reply, client, house).await;
+        }
         Request::Waves => reply.waves(house.settings(|settings| settings.waves)),
         Request::SetWaves(on) => {
             let set = |settings: &mut Settings| {
@@ -105,6 +113,7 @@ fn diagnose(reply: &mut Reply, house: &House) {
     });
     reply.diagnostics(&Diagnostics {
         name: &house.name(),
+        host: house.discovery.host().as_deref(),
         identity: house.identity,
         uptime: Micros::new(house.uptime().as_micros()),
         position,

@@ -61,8 +61,9 @@ pub struct Memory<F> {
 }
 
 impl<F: NorFlash> Memory<F> {
-    /// Over `range` of `flash`: an even number of whole pages, four at least, of which each can hold
-    /// the longest record; `None` when it is not.
+    /// Over `range` of `flash`: an even number of whole pages, four at least; `None` when it is not.
+    ///
+    /// What does not fit into one page cannot be stored: pages of 1 kB have room for the longest record.
     pub fn new(flash: F, range: Range<u32>) -> Option<Self> {
         let page = F::ERASE_SIZE as u32;
         let length = range.end.checked_sub(range.start)?;

@@ -36,10 +36,16 @@ fn settings() -> impl Strategy<Value = Settings> {
         uniform3(any::<i32>()),
         networks(),
         numbers,
-        fitting,
+        (option::of(vec(any::<u8>(), 8..=63)), fitting),
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves), (map, shift, servos))| {
+            |(
+                name,
+                offsets,
+                networks,
+                (start, access_point, waves),
+                (own, (map, shift, servos)),
+            )| {
                 Settings {
                     name: MachineName::new(&name).unwrap(),
                     calibration: Calibration {
@@ -48,6 +54,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                     networks,
                     start: StartMode::from_number(start).unwrap(),
                     access_point: AccessPointName::from_number(access_point).unwrap(),
+                    own_password: own.map(|phrase| Password::new(&phrase).unwrap()),
                     waves,
                     map: ZMap::new(map).unwrap(),
                     shift: NibShift::from_hundredths(shift).unwrap(),
@@ -143,6 +150,7 @@ fn the_bytes_of_a_record() {
         \x04\x01\x04\
         \x05\x01\x02\
         \x06\x01\x00\
+        \x07\x08\x00\xffsecret\
         \x18\x08\0\0\x64\0\x2c\x01\x38\xff\
         \x19\x02\xab\xff\
         \x1a\x01\x02";
@@ -160,6 +168,8 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.start, StartMode::StationLongPress);
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
+    let password = settings.own_password.as_ref().unwrap();
+    assert_eq!(password.as_bytes(), b"\x00\xffsecret");
     assert_eq!(settings.map.corners(), [0, 100, 300, -200]);
     assert_eq!(settings.shift.hundredths(), -85);
     assert_eq!(settings.directions.reversed, [false, true, false]);
@@ -169,6 +179,7 @@ fn the_bytes_of_a_record() {
 fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
+        own_password: Password::new(&[0xff; MAX_PASSWORD]),
         ..Settings::default()
     };
     for number in 0..MAX_NETWORKS {
@@ -213,6 +224,8 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x05\x01\x03",
         b"\x06\x01\x02",
         b"\x06\x00",
+        b"\x07\x00",
+        b"\x07\x07seven..",
         b"\x18\x07\0\0\0\0\0\0\0",
         b"\x18\x08\0\0\0\0\0\0\xf5\x01",
         b"\x19\x02\xc9\x00",

@@ -70,7 +70,14 @@ impl Bench {
             Job::Join(network) => std::format!("join {}", name(&network.ssid)),
             Job::Stay => "stay".to_string(),
             Job::Pause(until) => std::format!("pause {}", (until - NOW).get() / 1_000_000),
-            Job::Open(own) => std::format!("open {}", name(own)),
+            Job::Open(own) => match &own.password {
+                None => std::format!("open {}", name(&own.ssid)),
+                Some(password) => std::format!(
+                    "open {}, {}",
+                    name(&own.ssid),
+                    StdString::from_utf8_lossy(password.as_bytes())
+                ),
+            },
             Job::Host => "host".to_string(),
         }
     }
@@ -93,6 +100,23 @@ impl Bench {
         assert_eq!(bench.job(), "host");
         bench
     }
+}
+
+#[test]
+fn the_own_network_has_the_password_that_is_set_when_it_is_opened() {
+    let mut settings = settings(&[]);
+    settings.own_password = Password::new(b"battery staple");
+    let mut bench = Bench::new(settings);
+    bench.hears(&[]);
+    assert_eq!(bench.job(), "open Line-us-Setup, battery staple");
+    bench.on(Event::Opened(true));
+    // Guests are not thrown out.
+    bench.settings.own_password = None;
+    bench.on(Event::Changed);
+    assert_eq!(bench.job(), "host");
+    bench.on(Event::Restart);
+    bench.hears(&[]);
+    assert_eq!(bench.job(), "open Line-us-Setup");
 }
 
 #[test]
