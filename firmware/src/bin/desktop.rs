@@ -223,6 +223,10 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     }
     log::info!("  picture:         {}", options.picture.display());
     log::info!("  stop with Ctrl-C");
+    let ports = Ports {
+        line_us: options.line_us.port(),
+        web: web.as_ref().map(|(address, _)| address.port()),
+    };
     let mut spawned = Ok(());
     clock::run(
         options.speed,
@@ -232,7 +236,7 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
                 .and_then(|()| web.map_or(Ok(()), |web| serve_browsers(spawner, house, web)))
                 .and_then(|()| {
                     if let Some(multicast) = multicast {
-                        spawner.spawn(discovery(house, multicast, options.line_us.port())?);
+                        spawner.spawn(discovery(house, multicast, ports)?);
                     }
                     Ok(())
                 });
@@ -409,8 +413,7 @@ async fn wifi(house: &'static House, networks: Option<PathBuf>) {
 }
 
 #[embassy_executor::task]
-async fn discovery(house: &'static House, multicast: Multicast, line_us: u16) {
-    let ports = Ports { line_us, web: None };
+async fn discovery(house: &'static House, multicast: Multicast, ports: Ports) {
     discovery::run(house, &multicast, || Some(multicast.address()), ports).await;
 }
 

@@ -190,7 +190,7 @@ async fn button(house: &'static House, button: Button) {
 async fn discovery(house: &'static House, multicast: Multicast) {
     let ports = Ports {
         line_us: PORT,
-        web: None,
+        web: Some(web::PORT),
     };
     discovery::run(house, &multicast, || multicast.address(), ports).await;
 }

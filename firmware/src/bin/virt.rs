@@ -246,7 +246,7 @@ async fn network_stack(mut runner: Runner<'static, VirtNet>) {
 async fn discovery(house: &'static House, multicast: Multicast) {
     let ports = Ports {
         line_us: PORT,
-        web: None,
+        web: Some(web::PORT),
     };
     discovery::run(house, &multicast, || multicast.address(), ports).await;
 }

@@ -5,11 +5,10 @@
 
 use super::failure::{Failure, Status};
 use super::request::{Owner, Refused};
+use crate::services::portal;
 use core::net::{Ipv4Addr, Ipv6Addr};
-use protocol_core::settings::{AllowedOrigin, MachineName};
+use protocol_core::settings::AllowedOrigin;
 
-/// Where the machine is in its own network.
-const SETUP_PAGE: &str = "http://192.168.4.1/";
 /// What may stand behind the machine's name: names that are nobody's on the Internet (RFC 6762, RFC 8375,
 /// ICANN's reservation of `internal`, and what many routers call their network).
 const DOMAINS: [&str; 4] = ["local", "lan", "home.arpa", "internal"];
@@ -27,7 +26,7 @@ pub fn check(asker: &Asker<'_>, owner: &Owner<'_>) -> Result<bool, Refused> {
         && !is_own(host, owner)
     {
         if owner.setup {
-            return Err(Refused::Redirect(SETUP_PAGE));
+            return Err(Refused::Redirect(portal::URL));
         }
         let message = format_args!(
             "this machine is {}.local, not '{host:.64}'",
@@ -59,7 +58,9 @@ fn is_own(host: &str, owner: &Owner<'_>) -> bool {
         AllowedOrigin::Only(origin) => origin.host().eq_ignore_ascii_case(host),
         _ => false,
     };
-    allowed || is_address(host) || is_name(without_port(host), owner.name)
+    let name = without_port(host);
+    let found = owner.found_as.is_some_and(|found| is_name(name, found));
+    allowed || is_address(host) || found || is_name(name, owner.name.as_str())
 }
 
 fn without_port(host: &str) -> &str {
@@ -77,7 +78,7 @@ fn is_address(host: &str) -> bool {
     without_port(host).parse::<Ipv4Addr>().is_ok()
 }
 
-fn is_name(name: &str, own: &MachineName) -> bool {
+fn is_name(name: &str, own: &str) -> bool {
     if name.eq_ignore_ascii_case("localhost") {
         return true;
     }
@@ -86,18 +87,19 @@ fn is_name(name: &str, own: &MachineName) -> bool {
         || DOMAINS
             .iter()
             .any(|known| domain.eq_ignore_ascii_case(known));
-    domain && first.eq_ignore_ascii_case(own.as_str())
+    domain && first.eq_ignore_ascii_case(own)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol_core::settings::Origin;
+    use protocol_core::settings::{MachineName, Origin};
 
     fn outcome(host: &str, origin: &str, allowed: &str, setup: bool) -> Result<bool, u16> {
         let owner = Owner {
             name: &MachineName::default(),
             allowed: &AllowedOrigin::new(allowed).unwrap(),
+            found_as: Some("line-us-2"),
             setup,
             page_tag: "",
         };
@@ -129,6 +131,7 @@ mod tests {
             "Line-Us.LOCAL:80",
             "line-us.local.",
             "line-us",
+            "line-us-2.local:80",
             "line-us.home.arpa",
         ] {
             assert_eq!(outcome(host, "", "", false), Ok(false), "{host}");

@@ -204,9 +204,11 @@ fn count(count: &AtomicU8, change: i8) {
 
 fn read(head: &[u8], house: &House) -> Result<Request, Refused> {
     let setup = house.wifi.is_setup();
+    let found_as = house.discovery.host();
     house.settings(|settings| {
         let owner = Owner {
             name: &settings.name,
+            found_as: found_as.as_deref(),
             allowed: &settings.allowed_origin,
             setup,
             page_tag: page::TAG,

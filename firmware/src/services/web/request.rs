@@ -4,6 +4,7 @@
 use super::access::{self, Asker};
 use super::failure::{Failure, Status};
 use super::query::Query;
+use crate::services::portal;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use protocol_core::settings::{AllowedOrigin, MachineName};
@@ -104,6 +105,8 @@ impl From<Failure> for Refused {
 #[derive(Clone, Debug)]
 pub struct Owner<'a> {
     pub name: &'a MachineName,
+    /// The name under which it is found, where that is another one.
+    pub found_as: Option<&'a str>,
     pub allowed: &'a AllowedOrigin,
     /// On its own network.
     pub setup: bool,
@@ -131,6 +134,9 @@ impl Request {
             host: headers.once("host")?,
             origin: headers.once("origin")?,
         };
+        if let Some(url) = portal::redirect(owner.setup, asker.host, path) {
+            return Err(Refused::Redirect(url));
+        }
         let from_elsewhere = access::check(&asker, owner)?;
         let length = length(&headers)?;
         let accept = accept(&headers)?;
@@ -271,6 +277,7 @@ mod tests {
     fn read(head: &str) -> Result<Request, Refused> {
         let owner = Owner {
             name: &MachineName::default(),
+            found_as: None,
             allowed: &AllowedOrigin::None,
             setup: false,
             page_tag: "\"tag\"",
@@ -393,6 +400,7 @@ mod tests {
         fn any_bytes_are_read_or_refused(head: Vec<u8>) {
             let owner = Owner {
                 name: &MachineName::default(),
+                found_as: None,
                 allowed: &AllowedOrigin::None,
                 setup: false,
                 page_tag: "\"tag\"",
