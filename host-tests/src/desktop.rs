@@ -6,6 +6,8 @@
 mod client;
 mod process;
 pub mod serial;
+mod web;
 
 pub use client::{Client, TERMINATOR};
 pub use process::{Desktop, PORT, Run, binary, draw, target_folder, wait_until};
+pub use web::{Answer, Web, WebSocket};

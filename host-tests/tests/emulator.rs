@@ -2,7 +2,7 @@
 //! that survives, and servos of which every pulse is read back.
 
 use host_tests::desktop::serial::SerialPort;
-use host_tests::desktop::{Client, draw, wait_until};
+use host_tests::desktop::{Client, Web, draw, wait_until};
 use host_tests::lasaur::host::LasaurApp;
 use protocol_core::lasaur::BANNER;
 use protocol_core::motion::PEN_UP;
@@ -24,6 +24,7 @@ const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
 struct Machine {
     emulator: Emulator,
     address: SocketAddr,
+    web: Web,
     folder: TempDir,
     time: Time,
 }
@@ -44,8 +45,10 @@ impl Machine {
             .expect(
                 "QUILL_VIRT_FIRMWARE names the firmware: run these tests with `cargo xtask test`",
             );
+        let web = free_address().unwrap();
         let options = Options {
             line_us: free_address().unwrap(),
+            web: Some(web),
             flash: folder.path().join("flash"),
             time,
             serial,
@@ -55,6 +58,7 @@ impl Machine {
         Self {
             emulator,
             address: options.line_us,
+            web: Web::at(web),
             folder,
             time,
         }
@@ -640,4 +644,68 @@ fn a_stop_over_the_serial_line_reaches_an_arm_that_others_move() {
     port.send("~");
     assert_eq!(port.say("G90"), "");
     assert!(client.say("G28").starts_with("ok "));
+}
+
+#[test]
+fn a_browser_finds_the_page_and_the_machine_draws_what_it_sends() {
+    let mut machine = Machine::boot(Time::Wall);
+    let web = machine.web;
+    let page = web.get("/");
+    assert_eq!(
+        (page.status, page.header("content-encoding")),
+        (200, Some("gzip"))
+    );
+    assert_eq!(
+        page.body.len().to_string(),
+        page.header("content-length").unwrap()
+    );
+    let mut socket = web.web_socket("/");
+    assert!(socket.message().starts_with("hello VERSION:"));
+    let text = "G01 X1200 Y0\nG01 Z0\nG01 X1300\nG01 Z1000\n";
+    let job = web.done("/api/job", text);
+    assert_eq!(job["lines"]["total"], 4);
+    wait_until("the end of the drawing", || web.job_state() == "done");
+    assert_eq!(socket.say("M114"), "ok X:1300 Y:0 Z:1000");
+    assert_eq!(web.get("/api/job/drawing").body, text.as_bytes());
+    let down = machine
+        .frames()
+        .into_iter()
+        .filter(|frame| frame.set_point.position.pen_is_down());
+    assert!(down.count() > 20);
+}
+
+#[test]
+fn no_frame_is_late_or_missing_in_a_crowd_of_browsers() {
+    let mut machine = Machine::boot(Time::Virtual);
+    let web = machine.web;
+    let text =
+        "G01 X1200 Y0\nG01 Z0\nG01 X1500\nG01 Y300\nG01 X1200\nG01 Y0\nG01 Z1000\n".repeat(150);
+    let job = web.post("/api/job", &text);
+    // An answer may be lost, where time jumps while it is on its way; the drawing is not.
+    assert!(matches!(job.status, 200 | 409), "{job:?}");
+    for _ in 0..3 {
+        web.crowd(50);
+    }
+    wait_until("the end of the drawing", || web.job_state() == "done");
+    assert_eq!(web.state()["job"]["lines"]["done"], text.lines().count());
+    let frames = machine.frames();
+    let moving = frames.iter().filter(|frame| frame.set_point.moving).count();
+    assert!(moving > 50_000, "{moving} frames in motion");
+    let worst = frames.iter().max_by_key(|frame| frame.late).unwrap();
+    // As above.
+    assert!(worst.late <= 2, "{} us late: {worst:?}", worst.late);
+}
+
+#[test]
+fn a_press_of_the_button_ends_a_stop() {
+    let (mut machine, mut port) = boot_with_serial();
+    port.send("!");
+    assert_eq!(port.say("?"), "!R");
+    // Presses within the first two seconds are for a factory reset.
+    thread::sleep(Duration::from_secs(2));
+    machine.emulator.say("button down").unwrap();
+    thread::sleep(Duration::from_millis(200));
+    machine.emulator.say("button up").unwrap();
+    wait_until("the end of the stop", || port.say("G90").is_empty());
+    assert!(machine.client().say("G28").starts_with("ok "));
 }

@@ -26,7 +26,9 @@ mod motion;
 mod plotter;
 
 pub use data::{ArmData, SetPoint, nib_of, position_of};
-pub use errand::{Bare, Client, Errand, Limited, MAX_ASKERS, MAX_CLIENTS, Manner, Report, Target};
+pub use errand::{
+    Bare, Client, Errand, Limited, MAX_ASKERS, MAX_CLIENTS, MAX_WEB_CLIENTS, Manner, Report, Target,
+};
 pub use plotter::{NotPlanned, StopReason};
 
 use crate::arm::{Calibration, Compensation, Directions, Pulses};
@@ -142,6 +144,14 @@ impl Machine {
         // One place for each client, and this client's was made free above.
         let _ = self.waiting.push_back(Turn::Errand(client, *errand));
         None
+    }
+
+    /// Takes back an errand that waits; says whether there was one. What has begun goes on, and its
+    /// report comes.
+    pub fn withdraw(&mut self, client: Client) -> bool {
+        let before = self.waiting.len();
+        self.waiting.retain(|turn| !turn.is_errand_of(client));
+        self.waiting.len() < before
     }
 
     /// The next report of an errand that had to wait.

@@ -1,8 +1,10 @@
 //! What the arm remembers, and its form in memory.
 
+mod origin;
 mod parts;
 mod record;
 
+pub use origin::{AllowedOrigin, MAX_ORIGIN, Origin};
 pub use record::MAX_RECORD;
 
 use crate::arm::{Calibration, Compensation, Directions, NibShift, ZMap};
@@ -136,6 +138,8 @@ pub struct Settings {
     pub shift: NibShift,
     /// Which servos turn the other way (M280).
     pub directions: Directions,
+    /// Whose pages may drive the arm through its web interface, beside its own.
+    pub allowed_origin: AllowedOrigin,
 }
 
 impl Settings {
@@ -146,8 +150,8 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// `line-us`, no calibration, no network, its own one open, a station that waves, on flat paper, and a
-    /// button that draws the next drawing.
+    /// `line-us`, no calibration, no network, its own one open, a station that waves, on flat paper, pages
+    /// from elsewhere kept out, and a button that draws the next drawing.
     fn default() -> Self {
         Self {
             name: MachineName::default(),
@@ -161,6 +165,7 @@ impl Default for Settings {
             map: ZMap::FLAT,
             shift: NibShift::NONE,
             directions: Directions::default(),
+            allowed_origin: AllowedOrigin::None,
         }
     }
 }

@@ -152,6 +152,7 @@ fn round_trip(program: &Path) -> Result<u64> {
     let folder = tempfile::tempdir()?;
     let options = Options {
         line_us: free_address()?,
+        web: None,
         flash: folder.path().join("flash.img"),
         time: Time::Instructions,
         serial: None,

@@ -1,5 +1,6 @@
 //! The developer's commands.
 
+mod browser;
 mod emulate;
 mod image;
 mod table;
@@ -67,6 +68,8 @@ enum Task {
         #[arg(long)]
         csv: bool,
     },
+    /// Run the tests of the page that the arm serves, in a browser too
+    Page,
     /// Run everything that must pass: format, lints, documentation, tests, emulator, images
     Test,
 }
@@ -79,6 +82,9 @@ struct Emulate {
     /// Where laser software connects to the serial line, over TCP
     #[arg(long, value_name = "ADDR")]
     serial_tcp: Option<SocketAddr>,
+    /// Where browsers on this computer connect
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
+    web: SocketAddr,
     /// The machine's flash, kept between runs; made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.flash")]
     flash: PathBuf,
@@ -122,6 +128,7 @@ fn perform(cli: Cli) -> Result<()> {
             table::bench(&bench::measure(setup)?, csv);
             Ok(())
         }
+        Task::Page => browser::test(setup),
         Task::Test => test::everything(setup),
     }
 }

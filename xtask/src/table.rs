@@ -1,6 +1,7 @@
 //! Figures for people and for scripts.
 
 use anyhow::Result;
+use firmware::services::web::PAGE_SIZE;
 use xtask::bench::{Goal, Row};
 use xtask::board::Board;
 use xtask::size::Size;
@@ -36,6 +37,7 @@ pub fn sizes(setup: bool) -> Result<()> {
             println!("{:<10} MISSED", board.name());
         }
     }
+    println!("{:<10} {:<12} {PAGE_SIZE:>12}", "each", "page");
     Ok(())
 }
 

@@ -12,6 +12,7 @@ use xtask::toolchain::require;
 /// Runs all checks, the quick ones first, up to the first that fails.
 pub fn everything(setup: bool) -> Result<()> {
     require(QEMU.0, QEMU.1, setup)?;
+    crate::browser::require_programs(setup)?;
     step("format", || run(cargo().args(["fmt", "--all", "--check"])))?;
     step("lints", || {
         run(cargo().args([
@@ -37,6 +38,7 @@ pub fn everything(setup: bool) -> Result<()> {
     step("tests", || {
         run(cargo().args(["test", "--workspace", "--locked"]))
     })?;
+    step("page", || crate::browser::test(setup))?;
     step("fuzzing", fuzz)?;
     step("lints for the chips", || {
         Board::Virt.lint(&["virt", "echo", "bench"], &["bench"], setup)?;

@@ -1,12 +1,14 @@
 //! The desktop arm: the firmware of the drawing arm with sockets, files and a picture.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use core::net::SocketAddr;
+use core::net::{AddrParseError, IpAddr, Ipv4Addr, SocketAddr};
+use core::str::FromStr;
 use edge_nal::TcpAccept;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Timer};
 use firmware::board::NoInputs;
+use firmware::boards::desktop::air;
 use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::draw_lasaur::{self, Listener as Replies, Sender};
@@ -23,7 +25,7 @@ use firmware::services::drawings::Album;
 use firmware::services::line_us::{Server, serve};
 use firmware::services::serial::{self, ReadError};
 use firmware::services::storage::Memory;
-use firmware::services::{drawer, network};
+use firmware::services::{drawer, network, web};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS, StopReason};
 use protocol_core::motion::Micros;
@@ -72,6 +74,9 @@ struct Serve {
     /// one.
     #[arg(long)]
     mdns: bool,
+    /// Where browsers find the arm's page: an address, or 'none' [default: 127.0.0.1:8080, where it is free]
+    #[arg(long, value_name = "ADDR")]
+    web: Option<Web>,
     /// Where the arm keeps its name, calibration and network, made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.state")]
     state: PathBuf,
@@ -87,9 +92,37 @@ struct Serve {
     /// The picture, SVG or PNG, rewritten whenever the arm comes to rest
     #[arg(long, value_name = "FILE", default_value = "drawing.svg")]
     picture: PathBuf,
+    /// Networks that can be joined, a line each: name, password, strength in dBm, separated by tabs
+    ///
+    /// The file is read again when it changes. Without it, the arm is in the computer's own network.
+    #[arg(long, value_name = "FILE")]
+    air: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
+
+/// Where the web interface is.
+#[derive(Clone, Copy)]
+enum Web {
+    Nowhere,
+    At(SocketAddr),
+}
+
+impl FromStr for Web {
+    type Err = AddrParseError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "none" => Ok(Self::Nowhere),
+            address => address.parse().map(Self::At),
+        }
+    }
+}
+
+/// Where the web interface is unless it is told otherwise.
+const WEB: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
+/// Bytes of a drawing that the machine holds.
+const DRAWING: usize = 64 * 1024;
 
 #[derive(Args)]
 struct Draw {
@@ -167,6 +200,7 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
         .then(|| Multicast::beside(options.line_us.ip()))
         .transpose()
         .map_err(|error| named(&"--mdns", error))?;
+    let web = listen_for_browsers(options.web)?;
     let data = ArmData {
         lift_after: Micros::from_secs(options.lift_after),
         ..ArmData::default()
@@ -176,7 +210,10 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
         picture: Some(options.picture.clone()),
     };
     let (recorder, servos) = Recorder::start(outputs, data, options.speed == Speed::Max)?;
-    let (house, memory) = house(data, flash)?;
+    if let Some(file) = &options.air {
+        air::read(file).map_err(|error| named(&file.display(), error))?;
+    }
+    let (house, memory) = house(data, flash, options.air.is_none())?;
     let album = album(drawings)?;
     let frame = options.common.frame();
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed)).map_err(io::Error::other)?;
@@ -189,20 +226,37 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     if let Some(address) = &options.serial_tcp {
         log::info!("  serial port:     {address} (TCP)");
     }
+    match &web {
+        Some((address, _)) => log::info!("  page:            http://{address}/"),
+        None => log::info!("  page:            none"),
+    }
     log::info!("  picture:         {}", options.picture.display());
     log::info!("  stop with Ctrl-C");
+    let ports = Ports {
+        line_us: options.line_us.port(),
+        web: web.as_ref().map(|(address, _)| address.port()),
+    };
     let mut spawned = Ok(());
     clock::run(
         options.speed,
         |spawner| {
-            spawned = serve_clients(spawner, house, (memory, album), servos, frame, listener)
-                .and_then(|()| serve_port(spawner, port, house))
-                .and_then(|()| {
-                    if let Some(multicast) = multicast {
-                        spawner.spawn(discovery(house, multicast, options.line_us.port())?);
-                    }
-                    Ok(())
-                });
+            spawned = serve_clients(
+                spawner,
+                house,
+                (memory, album),
+                servos,
+                frame,
+                listener,
+                options.air,
+            )
+            .and_then(|()| serve_port(spawner, port, house))
+            .and_then(|()| web.map_or(Ok(()), |web| serve_browsers(spawner, house, web)))
+            .and_then(|()| {
+                if let Some(multicast) = multicast {
+                    spawner.spawn(discovery(house, multicast, ports)?);
+                }
+                Ok(())
+            });
         },
         || STOP.load(Ordering::Relaxed),
     );
@@ -274,13 +328,14 @@ fn serve_clients(
     servos: RecordedServos,
     frame: Duration,
     listener: &'static Listener,
+    air: Option<PathBuf>,
 ) -> Result<(), SpawnError> {
     static SERVER: Server = Server::new();
     spawner.spawn(arm(house, servos, frame)?);
     spawner.spawn(storage(house, memory)?);
     spawner.spawn(drawings(house, album)?);
     spawner.spawn(draw_stored(house)?);
-    spawner.spawn(wifi(house)?);
+    spawner.spawn(wifi(house, air)?);
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(listener, client, house)?);
     }
@@ -298,6 +353,55 @@ fn serve_clients(
     }
 }
 
+/// Unless it was asked for, the web interface is where it is free, or not at all.
+fn listen_for_browsers(web: Option<Web>) -> io::Result<Option<(SocketAddr, &'static Listener)>> {
+    let address = match web {
+        None => WEB,
+        Some(Web::At(address)) => address,
+        Some(Web::Nowhere) => return Ok(None),
+    };
+    let bound = embassy_futures::block_on(Listener::bind(address));
+    match bound {
+        Ok(listener) => Ok(Some((address, Box::leak(Box::new(listener))))),
+        Err(error) if web.is_none() => {
+            log::warn!("no page at {address}: {error}");
+            Ok(None)
+        }
+        Err(error) => Err(io::Error::new(error.kind(), format!("{address}: {error}"))),
+    }
+}
+
+fn serve_browsers(
+    spawner: Spawner,
+    house: &'static House,
+    (address, listener): (SocketAddr, &'static Listener),
+) -> Result<(), SpawnError> {
+    static SERVER: web::Server = web::Server::new();
+    let own = Some(address.ip()).filter(|own| !own.is_unspecified());
+    house.address.lock(|place| place.set(own));
+    for client in (0..).map_while(Client::web) {
+        spawner.spawn(worker(listener, client, house)?);
+    }
+    spawner.spawn(doorman(listener)?);
+    spawner.spawn(job(house, vec![0; DRAWING].leak())?);
+    return Ok(());
+
+    #[embassy_executor::task(pool_size = web::CONNECTIONS)]
+    async fn worker(listener: &'static Listener, client: Client, house: &'static House) {
+        SERVER.work(listener, client, house).await;
+    }
+
+    #[embassy_executor::task]
+    async fn doorman(listener: &'static Listener) {
+        SERVER.turn_away(listener).await;
+    }
+
+    #[embassy_executor::task]
+    async fn job(house: &'static House, room: &'static mut [u8]) {
+        house.job.run(house, room).await;
+    }
+}
+
 #[embassy_executor::task]
 async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
     house
@@ -306,23 +410,29 @@ async fn arm(house: &'static House, servos: RecordedServos, frame: Duration) {
         .await;
 }
 
-/// There is no radio here: the network policy runs on one that hears the computer's own network alone.
+/// There is no radio here: the network policy runs on one that hears the computer's own network alone, or
+/// what is in a file.
 #[embassy_executor::task]
-async fn wifi(house: &'static House) {
-    static AIR: Air = Air::new(Pace::INSTANT);
+async fn wifi(house: &'static House, networks: Option<PathBuf>) {
+    static OWN: Air = Air::new(Pace::INSTANT);
+    static SCRIPTED: Air = Air::new(Pace::LIFELIKE);
+    if let Some(file) = networks {
+        let radio = ScriptedRadio::new(&SCRIPTED);
+        let policy = network::run(house, radio, NoAddress);
+        embassy_futures::join::join(policy, air::follow(&SCRIPTED, &file)).await;
+        return;
+    }
     let own = own_network();
-    AIR.put(OnAir {
+    OWN.put(OnAir {
         ssid: own.ssid,
         password: own.password,
         signal_dbm: -30,
     });
-    let radio = ScriptedRadio::new(&AIR);
-    network::run(house, radio, NoAddress).await;
+    network::run(house, ScriptedRadio::new(&OWN), NoAddress).await;
 }
 
 #[embassy_executor::task]
-async fn discovery(house: &'static House, multicast: Multicast, line_us: u16) {
-    let ports = Ports { line_us, web: None };
+async fn discovery(house: &'static House, multicast: Multicast, ports: Ports) {
     discovery::run(house, &multicast, || Some(multicast.address()), ports).await;
 }
 
@@ -349,13 +459,17 @@ fn album(flash: FileFlash) -> io::Result<Album<Flash>> {
     Ok(album)
 }
 
-/// An arm with what its flash remembers.
-fn house(data: ArmData, flash: FileFlash) -> io::Result<(&'static House, Memory<Flash>)> {
+/// An arm with what its flash remembers, in the computer's own network where it is `at_home` and remembers none.
+fn house(
+    data: ArmData,
+    flash: FileFlash,
+    at_home: bool,
+) -> io::Result<(&'static House, Memory<Flash>)> {
     let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
     let mut memory =
         memory.ok_or_else(|| io::Error::other("the flash does not hold whole pages"))?;
     let (mut settings, _) = embassy_futures::block_on(memory.load());
-    if settings.networks.is_empty() {
+    if at_home && settings.networks.is_empty() {
         let _ = settings.networks.put(own_network());
     }
     let house = House::new(data, settings, IDENTITY, VITALS);
@@ -393,7 +507,7 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
         picture: options.picture.clone(),
     };
     let (recorder, servos) = Recorder::start(outputs, data, false)?;
-    let (house, memory) = house(data, FileFlash::in_memory(flash::SIZE))?;
+    let (house, memory) = house(data, FileFlash::in_memory(flash::SIZE), true)?;
     let album = album(FileFlash::in_memory(flash::DRAWINGS_SIZE))?;
     let frame = options.common.frame();
 

@@ -5,6 +5,7 @@
 use core::future::pending;
 use edge_nal::TcpBind;
 use embassy_executor::{SpawnError, Spawner};
+use embassy_net::Stack;
 use embassy_time::{Duration, Ticker};
 use firmware::board::Vitals;
 use firmware::boards::embassy_udp::Multicast;
@@ -12,7 +13,7 @@ use firmware::boards::esp::data::BOARD;
 use firmware::boards::esp::flash::FlashPartition;
 use firmware::boards::esp::inputs::Inputs;
 use firmware::boards::esp::light::Light;
-use firmware::boards::esp::net::{Connections, Net, NetRunner};
+use firmware::boards::esp::net::{Connections, Net, NetRunner, WebConnections};
 use firmware::boards::esp::radio::EspRadio;
 use firmware::boards::esp::serial::{SerialRx, SerialTx};
 use firmware::boards::esp::servos::{FRAME, ServoPorts};
@@ -25,11 +26,14 @@ use firmware::services::drawings::Album;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
-use firmware::services::{drawer, network, panel};
+use firmware::services::{drawer, network, panel, web};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 use protocol_core::panel::Lamp;
 use protocol_core::settings::Settings;
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
+
+/// Bytes of a drawing that the machine holds: of what a chip has, this is what can be spared for good.
+const DRAWING: usize = 16 * 1024;
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
@@ -98,12 +102,20 @@ fn spawn(
     };
     let tcp = net.connections();
     spawner.spawn(discovery(house, net.multicast())?);
+    let web = net.web_connections();
+    spawner.spawn(tell_address(house, net.stack())?);
     spawner.spawn(network_stack(runner)?);
     spawner.spawn(wifi(house, radio, net)?);
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(tcp, client, house)?);
     }
     spawner.spawn(doorman(tcp)?);
+    static ROOM: ConstStaticCell<[u8; DRAWING]> = ConstStaticCell::new([0; _]);
+    spawner.spawn(job(house, ROOM.take())?);
+    for client in (0..).map_while(Client::web) {
+        spawner.spawn(web_worker(web, client, house)?);
+    }
+    spawner.spawn(web_doorman(web)?);
     Ok(())
 }
 
@@ -120,6 +132,41 @@ async fn worker(tcp: Connections, client: Client, house: &'static House) {
 async fn doorman(tcp: Connections) {
     if let Ok(acceptor) = tcp.bind(ANYWHERE).await {
         SERVER.turn_away(&acceptor).await;
+    }
+}
+
+static WEB_SERVER: web::Server = web::Server::new();
+
+#[embassy_executor::task(pool_size = web::CONNECTIONS)]
+async fn web_worker(tcp: WebConnections, client: Client, house: &'static House) {
+    if let Ok(acceptor) = tcp.bind(web::ANYWHERE).await {
+        WEB_SERVER.work(&acceptor, client, house).await;
+    }
+}
+
+#[embassy_executor::task]
+async fn web_doorman(tcp: WebConnections) {
+    if let Ok(acceptor) = tcp.bind(web::ANYWHERE).await {
+        WEB_SERVER.turn_away(&acceptor).await;
+    }
+}
+
+#[embassy_executor::task]
+async fn job(house: &'static House, room: &'static mut [u8]) {
+    house.job.run(house, room).await;
+}
+
+/// Keeps the address that is told to browsers up to date.
+#[embassy_executor::task]
+async fn tell_address(house: &'static House, stack: Stack<'static>) {
+    loop {
+        stack.wait_config_up().await;
+        let own = stack
+            .config_v4()
+            .map(|config| config.address.address().into());
+        house.address.lock(|place| place.set(own));
+        stack.wait_config_down().await;
+        house.address.lock(|place| place.set(None));
     }
 }
 
@@ -173,7 +220,7 @@ async fn button(house: &'static House, button: Button) {
 async fn discovery(house: &'static House, multicast: Multicast) {
     let ports = Ports {
         line_us: PORT,
-        web: None,
+        web: Some(web::PORT),
     };
     discovery::run(house, &multicast, || multicast.address(), ports).await;
 }

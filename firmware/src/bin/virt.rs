@@ -31,7 +31,7 @@ use firmware::services::drawings::Album;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
-use firmware::services::{drawer, network, panel};
+use firmware::services::{drawer, network, panel, web};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -41,12 +41,19 @@ const FRAME: Duration = Duration::from_millis(10);
 /// One connection for each client, and one to turn another away.
 const CONNECTIONS: usize = MAX_CLIENTS + 1;
 const BUFFER: usize = 2048;
+/// Connections of browsers, and one to turn another away.
+const WEB_CONNECTIONS: usize = web::CONNECTIONS + 1;
+/// Sockets: these, the DHCP client, and one more.
+const SOCKETS: usize = CONNECTIONS + WEB_CONNECTIONS + 3;
+/// Bytes of a drawing that the machine holds.
+const DRAWING: usize = 64 * 1024;
 
 /// The disk, which settings and drawings share.
 type Disk = Mutex<NoopRawMutex, Flash>;
 type Part = Partition<'static, NoopRawMutex, Flash>;
 type SerialPort = (Receiver, Transmitter);
 type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
+type WebConnections = Tcp<WEB_CONNECTIONS, BUFFER, BUFFER>;
 
 /// Never returns.
 #[riscv_rt::entry]
@@ -132,7 +139,7 @@ fn start(
     (memory, album): (&'static mut Memory<Part>, &'static mut Album<Part>),
     card: VirtNet,
 ) -> Result<(), SpawnError> {
-    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 3 }>> = StaticCell::new();
+    static RESOURCES: StaticCell<StackResources<SOCKETS>> = StaticCell::new();
     static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; CONNECTIONS]> =
         ConstStaticCell::new([const { Buffers::new() }; _]);
     static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
@@ -148,14 +155,53 @@ fn start(
     let (stack, runner) =
         embassy_net::new(card, Config::dhcpv4(Default::default()), resources, 1234);
     spawner.spawn(network_stack(runner)?);
-    spawner.spawn(tell_address(stack)?);
     spawner.spawn(discovery(house, Multicast::new(stack))?);
+    spawner.spawn(tell_address(house, stack)?);
     let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
     for client in (0..).map_while(Client::new) {
         spawner.spawn(worker(tcp, client, house)?);
     }
     spawner.spawn(doorman(tcp)?);
-    Ok(())
+    serve_browsers(spawner, house, stack)
+}
+
+fn serve_browsers(
+    spawner: Spawner,
+    house: &'static House,
+    stack: Stack<'static>,
+) -> Result<(), SpawnError> {
+    static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; WEB_CONNECTIONS]> =
+        ConstStaticCell::new([const { Buffers::new() }; _]);
+    static POOL: StaticCell<Pool<WEB_CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
+    static ROOM: ConstStaticCell<[u8; DRAWING]> = ConstStaticCell::new([0; _]);
+    static SERVER: web::Server = web::Server::new();
+
+    spawner.spawn(job(house, ROOM.take())?);
+    let tcp = Tcp::new(stack, POOL.init(Pool::new(BUFFERS.take())));
+    for client in (0..).map_while(Client::web) {
+        spawner.spawn(worker(tcp, client, house)?);
+    }
+    spawner.spawn(doorman(tcp)?);
+    return Ok(());
+
+    #[embassy_executor::task(pool_size = web::CONNECTIONS)]
+    async fn worker(tcp: WebConnections, client: Client, house: &'static House) {
+        if let Ok(acceptor) = tcp.bind(web::ANYWHERE).await {
+            SERVER.work(&acceptor, client, house).await;
+        }
+    }
+
+    #[embassy_executor::task]
+    async fn doorman(tcp: WebConnections) {
+        if let Ok(acceptor) = tcp.bind(web::ANYWHERE).await {
+            SERVER.turn_away(&acceptor).await;
+        }
+    }
+
+    #[embassy_executor::task]
+    async fn job(house: &'static House, room: &'static mut [u8]) {
+        house.job.run(house, room).await;
+    }
 }
 
 static SERVER: Server = Server::new();
@@ -231,15 +277,17 @@ async fn network_stack(mut runner: Runner<'static, VirtNet>) {
 async fn discovery(house: &'static House, multicast: Multicast) {
     let ports = Ports {
         line_us: PORT,
-        web: None,
+        web: Some(web::PORT),
     };
     discovery::run(house, &multicast, || multicast.address(), ports).await;
 }
 
 #[embassy_executor::task]
-async fn tell_address(stack: Stack<'static>) {
+async fn tell_address(house: &'static House, stack: Stack<'static>) {
     stack.wait_config_up().await;
     if let Some(config) = stack.config_v4() {
+        let own = config.address.address().into();
+        house.address.lock(|place| place.set(Some(own)));
         log::info!("Line-us clients: {}:{}", config.address.address(), PORT);
     }
 }

@@ -6,6 +6,7 @@
 use crate::board::{Frames, Servos};
 use core::array;
 use core::cell::RefCell;
+use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::{Mutex as Turns, MutexGuard as Turn};
@@ -50,6 +51,29 @@ impl Arm {
         match self.with(|machine| machine.take(client, errand)) {
             Some(report) => report,
             None => signal.wait().await,
+        }
+    }
+
+    /// As [`Self::errand`], but where the errand has not begun when `cancel` ends, it is taken back, and
+    /// there is no report.
+    pub async fn errand_unless(
+        &self,
+        client: Client,
+        errand: &Errand,
+        cancel: impl Future<Output = ()>,
+    ) -> Option<Report> {
+        let signal = self.reports.get(client.slot())?;
+        signal.reset();
+        if let Some(report) = self.with(|machine| machine.take(client, errand)) {
+            return Some(report);
+        }
+        if let Either::First(report) = select(signal.wait(), cancel).await {
+            return Some(report);
+        }
+        // Between the two it may have begun.
+        match self.with(|machine| machine.withdraw(client)) {
+            true => None,
+            false => Some(signal.wait().await),
         }
     }
 

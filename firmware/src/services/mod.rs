@@ -5,6 +5,7 @@ pub mod dhcp;
 pub mod discovery;
 pub mod drawer;
 pub mod drawings;
+pub mod job;
 pub mod line_us;
 pub mod names;
 pub mod network;
@@ -12,19 +13,23 @@ pub mod panel;
 pub mod portal;
 pub mod serial;
 pub mod storage;
+pub mod web;
 
 use crate::board::Vitals;
 use arm::Arm;
-use core::cell::RefCell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::cell::{Cell, RefCell};
+use core::net::IpAddr;
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use discovery::Discovery;
 use drawer::Drawer;
 use drawings::Drawings;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Duration, Instant, Timer};
+use job::Job;
 use network::Wifi;
 use panel::Panel;
+use protocol_core::arm::Calibration;
 use protocol_core::drawings::Slot;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, Machine};
@@ -48,6 +53,12 @@ pub struct House {
     pub discovery: Discovery,
     /// Light and button.
     pub panel: Panel,
+    /// The drawing that the machine draws by itself.
+    pub job: Job,
+    /// Line-us clients that are connected.
+    pub clients: AtomicU8,
+    /// Under which the machine can be reached, if it knows.
+    pub address: Mutex<CriticalSectionRawMutex, Cell<Option<IpAddr>>>,
     /// Who this machine is.
     pub identity: Identity,
     /// How it is.
@@ -71,6 +82,9 @@ impl House {
             wifi: Wifi::new(),
             discovery: Discovery::new(),
             panel: Panel::new(),
+            job: Job::new(),
+            clients: AtomicU8::new(0),
+            address: Mutex::new(Cell::new(None)),
             identity,
             vitals,
             settings: Mutex::new(RefCell::new(settings)),
@@ -170,6 +184,17 @@ impl House {
             self.put_in_force(new);
         }
         Ok(answer)
+    }
+
+    /// Makes the place where the arm rests the calibration point, or removes the calibration.
+    async fn calibrate(&self, here: bool, client: Client) -> Result<(), StoreError> {
+        let calibrate = |settings: &mut Settings| {
+            settings.calibration = match here {
+                true => self.arm.with(|machine| machine.calibration_here()),
+                false => Calibration::default(),
+            };
+        };
+        self.change(client, calibrate).await
     }
 
     fn put_in_force(&self, new: Settings) {

@@ -24,7 +24,7 @@ use protocol_core::wifi::{
     Effect, Event, Heard, Job, Joined, MAX_HEARD, Network, Phase, Policy, Status,
 };
 
-/// Time for the reply to `M587` to reach its client before the network changes.
+/// Time for the reply to `M587` or `M171` to reach its client before the network changes.
 const GRACE: Duration = Duration::from_millis(500);
 /// Longest time that a list of networks takes; clients wait 5 s for a reply.
 const LIST_AT_MOST: Duration = Duration::from_secs(4);

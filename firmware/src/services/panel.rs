@@ -55,6 +55,12 @@ impl Panel {
         self.change(|shown| Shown { lamp, ..shown });
     }
 
+    /// What is shown.
+    pub fn lamp(&self) -> Lamp {
+        let shown = self.shown.lock(Cell::get);
+        shown.first.unwrap_or(shown.lamp)
+    }
+
     /// Shows something instead, until it is told `None`.
     fn show_first(&self, first: Option<Lamp>) {
         self.change(|shown| Shown { first, ..shown });

@@ -1,6 +1,7 @@
 //! Building, starting and ending the program.
 
 use super::client::Client;
+use super::web::Web;
 use std::io::{BufRead, BufReader};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::path::{Path, PathBuf};
@@ -12,6 +13,8 @@ use std::{env, fs, process, thread};
 
 /// The port of Line-us, which its clients do not let one choose.
 pub const PORT: u16 = 1337;
+/// The port of its page.
+const WEB_PORT: u16 = 8080;
 /// For what takes milliseconds on an idle computer.
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -114,6 +117,8 @@ impl Desktop {
         let mut child = Command::new(binary())
             .arg("--line-us")
             .arg(address.to_string())
+            .arg("--web")
+            .arg(SocketAddr::new(address.ip(), WEB_PORT).to_string())
             .arg("--state")
             .arg(folder.join("state"))
             .arg("--picture")
@@ -150,6 +155,11 @@ impl Desktop {
     /// Where it listens.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Where its page is.
+    pub fn web(&self) -> Web {
+        Web::at(SocketAddr::new(self.address.ip(), WEB_PORT))
     }
 
     /// Its picture.

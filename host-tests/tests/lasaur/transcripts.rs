@@ -34,7 +34,7 @@ fn connected(rig: &mut Rig) -> LasaurApp {
     let mut host = LasaurApp::default();
     host.receive(BANNER.as_bytes());
     assert_eq!(host.lines, [BANNER.trim_end()]);
-    assert_eq!(rig.sent, []);
+    assert!(rig.sent.is_empty(), "{:?}", rig.sent);
     host
 }
 

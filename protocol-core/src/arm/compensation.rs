@@ -56,6 +56,8 @@ impl fmt::Display for NibShift {
 pub struct Compensation {
     map: ZMap,
     shift: NibShift,
+    /// Flat and vertical: as most arms are, so it is asked first.
+    is_none: bool,
     surface: Surface,
     /// The shift over the whole lift, in thousandths, in 1/2^28.
     pull: i32,
@@ -76,6 +78,7 @@ impl Compensation {
         Self {
             map,
             shift,
+            is_none: map == ZMap::FLAT && shift == NibShift::NONE,
             surface: Surface::new(map),
             pull: pull as i32,
         }
@@ -92,20 +95,26 @@ impl Compensation {
     }
 
     /// Whether nib and arm are always at the same place.
-    pub fn is_none(&self) -> bool {
-        self.map == ZMap::FLAT && self.shift == NibShift::NONE
+    pub const fn is_none(&self) -> bool {
+        self.is_none
     }
 
     /// Where the arm has to be so that the nib is at `nib`. Where that is outside the drawing area, the
     /// arm is held at its edge, and the nib misses its place by less than the shift.
     ///
     /// Z is between -500 and 1000.
-    #[inline]
+    #[inline(always)]
     pub fn arm(&self, nib: Position) -> Position {
-        let down = PEN_UP.bits() - nib.z.bits();
-        if down == 0 {
+        if self.is_none || nib.z == PEN_UP {
             return nib;
         }
+        self.below(nib)
+    }
+
+    /// A function of its own, so that the way of an exact arm stays in registers.
+    #[inline(never)]
+    fn below(&self, nib: Position) -> Position {
+        let down = PEN_UP.bits() - nib.z.bits();
         let raised = high_half(self.surface.part_of_lift(nib.x, nib.y), down << 4);
         let arm = Position {
             z: Coordinate::from_bits(nib.z.bits() + raised),

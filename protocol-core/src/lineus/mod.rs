@@ -9,5 +9,5 @@ mod session;
 
 pub use command::{Command, parse};
 pub use refusal::Refusal;
-pub use reply::{Diagnostics, Identity, MAX_REPLY, Reply, TERMINATOR, VERSION};
+pub use reply::{Diagnostics, Identity, InWords, MAX_REPLY, Reply, STOPPED, TERMINATOR, VERSION};
 pub use session::{Request, Session};

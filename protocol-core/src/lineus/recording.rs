@@ -7,7 +7,7 @@ use super::reply::Reply;
 use super::session;
 use super::session::Request;
 use crate::motion::Transform;
-use crate::text::{MAX_LINE, TooLong, WordError, Words};
+use crate::text::{MAX_LINE, WordError, Words};
 use heapless::Vec;
 
 /// What becomes of a command while the connection that sends it records.
@@ -71,13 +71,11 @@ const fn fate(command: &Command) -> Fate {
 
 /// What a line asks for; one that is to be kept is put into `recorded`.
 pub(super) fn request(
-    line: Result<&[u8], TooLong>,
+    line: Result<&[u8], Refusal<'_>>,
     recorded: &mut Vec<u8, MAX_LINE>,
     reply: &mut Reply,
 ) -> Request {
-    let parsed = line
-        .map_err(Refusal::from)
-        .and_then(|line| Ok((parse(line)?, line)));
+    let parsed = line.and_then(|line| Ok((parse(line)?, line)));
     let (command, line) = match parsed {
         Ok(parsed) => parsed,
         Err(refusal) => {

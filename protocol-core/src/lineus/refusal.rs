@@ -18,6 +18,8 @@ pub enum Refusal<'a> {
     NotYet,
     /// An M code of the original's that no document tells the meaning of.
     Reserved(u32),
+    /// A code that is for other connections than WebSockets.
+    NotHere(u32),
     /// A letter that the command does not have.
     UnknownParameter(char),
     /// A letter that the command needs.
@@ -87,6 +89,7 @@ impl fmt::Display for Refusal<'_> {
                 out.write_str("M997 is missing: this firmware cannot update itself yet")
             }
             Self::Reserved(number) => write!(out, "M{number} is reserved and does nothing here"),
+            Self::NotHere(code) => write!(out, "M{code} is refused over the WebSocket"),
             Self::Missing(letter) => write!(out, "parameter {letter} is missing"),
             Self::UnknownParameter(letter) => write!(out, "unknown parameter {letter}"),
             Self::Repeated(letter) => write!(out, "parameter {letter} is repeated"),

@@ -108,6 +108,13 @@ impl Reply {
         core::str::from_utf8(message.unwrap_or(&self.text)).unwrap_or_default()
     }
 
+    /// Why something was refused, if it says so.
+    pub fn reason(&self) -> Option<&str> {
+        self.message()
+            .strip_prefix("error INFO:\"")?
+            .strip_suffix('"')
+    }
+
     /// Whether it says that something was refused.
     pub const fn is_error(&self) -> bool {
         self.is_error
@@ -143,7 +150,7 @@ impl Reply {
         match report {
             Report::Resting => self.ok(),
             Report::Stopped => self.error(format_args!("{STOPPED}")),
-            Report::Moving { end, limited } => self.place(*end, limited.map(tell)),
+            Report::Moving { end, limited } => self.place(*end, limited.map(Limited::text)),
         }
     }
 
@@ -396,16 +403,8 @@ impl Reply {
     }
 }
 
-/// Why there is no move.
-const STOPPED: &str = "the machine is stopped: send ~ on the serial line or press the button";
-
-fn tell(limited: Limited) -> &'static str {
-    match limited {
-        Limited::Target { lifted: true } => "out of reach: going to the closest point, pen lifted",
-        Limited::Target { lifted: false } => "out of reach: going to the closest point",
-        Limited::Way => "the way leaves the drawing area: held at its edge",
-    }
-}
+/// Why there is no move: the machine is stopped.
+pub const STOPPED: &str = "the machine is stopped: send ~ on the serial line or press the button";
 
 /// As behind the letters of M280.
 fn numbers(directions: Directions) -> [u8; 3] {
@@ -431,7 +430,8 @@ fn entry_length(ssid: &Ssid) -> usize {
 }
 
 /// What the network is doing, without double quotes.
-struct InWords<'a>(&'a Status);
+#[derive(Clone, Copy, Debug)]
+pub struct InWords<'a>(pub &'a Status);
 
 impl fmt::Display for InWords<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -9,7 +9,7 @@ use crate::drawings::{ButtonDraws, Replay, Slot};
 use crate::machine::{Errand, Manner, Target};
 use crate::motion::{StepSize, Transform, WideCoordinate};
 use crate::settings::{AccessPointName, MachineName, StartMode};
-use crate::text::{LineBuffer, MAX_LINE};
+use crate::text::{LineBuffer, MAX_LINE, Words};
 use crate::wifi::{Password, Ssid};
 use heapless::Vec;
 
@@ -120,13 +120,18 @@ pub enum Request {
 
 /// What belongs to one connection: the line being received, scale and origin, and whether what comes is
 /// recorded instead of drawn.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Session {
     lines: LineBuffer,
     transform: Transform,
     recording: bool,
     recorded: Vec<u8, MAX_LINE>,
+    /// It is a WebSocket, which is refused some commands.
+    web_socket: bool,
 }
+
+/// What WebSockets are refused (`reference/line-us.md`, section 1).
+const NOT_OVER_WEB_SOCKETS: [u32; 5] = [170, 171, 587, 588, 589];
 
 impl Default for Session {
     fn default() -> Self {
@@ -142,6 +147,18 @@ impl Session {
             transform: Transform::IDENTITY,
             recording: false,
             recorded: Vec::new(),
+            web_socket: false,
+        }
+    }
+
+    /// A new WebSocket: the commands that such clients are refused, are refused.
+    pub const fn web_socket() -> Self {
+        Self {
+            lines: LineBuffer::new(),
+            transform: Transform::IDENTITY,
+            recording: false,
+            recorded: Vec::new(),
+            web_socket: true,
         }
     }
 
@@ -165,10 +182,18 @@ impl Session {
     /// in `reply`.
     pub fn next_request(&mut self, input: &mut &[u8], reply: &mut Reply) -> Option<Request> {
         let line = self.lines.next_line(input)?;
+        let web_socket = self.web_socket;
+        let line = line.map_err(Refusal::from).and_then(|line| {
+            if web_socket {
+                allowed(line)?;
+            }
+            Ok(line)
+        });
         if self.recording {
             return Some(recording::request(line, &mut self.recorded, reply));
         }
-        Some(match line.map_err(Refusal::from).and_then(parse) {
+        let command = line.and_then(parse);
+        Some(match command {
             // By reference: commands are large, and copying one costs as much as reading it.
             Ok(command) => request(&mut self.transform, &command, reply),
             Err(refusal) => {
@@ -176,6 +201,16 @@ impl Session {
                 Request::Answered
             }
         })
+    }
+}
+
+fn allowed(line: &[u8]) -> Result<(), Refusal<'_>> {
+    match Words::new(line).code() {
+        Ok(Some((b'M', code))) if NOT_OVER_WEB_SOCKETS.contains(&code) => {
+            Err(Refusal::NotHere(code))
+        }
+        // What is wrong with it is found when it is parsed.
+        _ => Ok(()),
     }
 }
 
@@ -798,6 +833,26 @@ mod tests {
             password: Password::new(&[b'"'; 63]),
         };
         assert_eq!(only(&line).0, request);
+    }
+
+    #[test]
+    fn websockets_are_refused_some_commands_by_name() {
+        for (line, code) in [
+            ("M170", 170),
+            ("m171 SCONFIRM", 171),
+            ("M587", 587),
+            ("M587 Shome P\"correct horse\"", 587),
+            ("(a) M0588 S*", 588),
+            ("M588 Q", 588),
+        ] {
+            let stream = std::format!("{line}\n");
+            let found = requests(&mut Session::web_socket(), stream.as_bytes());
+            let reason = std::format!("error INFO:\"M{code} is refused over the WebSocket\"");
+            assert_eq!(found, [(Request::Answered, reason)], "{line}");
+        }
+        let moves = requests(&mut Session::web_socket(), b"G01 X900 Y300 Z1\nM552\n");
+        assert_eq!(moves[0].0, straight(900.0, 300.0, 1.0));
+        assert_eq!(moves[1].0, Request::Start);
     }
 
     /// Lines that are nearly right, where the mistakes hide.

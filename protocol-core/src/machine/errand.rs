@@ -7,9 +7,12 @@ use crate::motion::{HOME, Micros, Position, WideCoordinate};
 /// Clients that may be connected at once; the next one is told so and closed.
 pub const MAX_CLIENTS: usize = 4;
 
-/// Everybody who may ask something of the arm: network clients, the serial port, the firmware itself, a
-/// drawing from memory.
-pub const MAX_ASKERS: usize = MAX_CLIENTS + 3;
+/// Connections of the web interface that may be served at once; the next one is told so and closed.
+pub const MAX_WEB_CLIENTS: usize = 4;
+
+/// Everybody who may ask something of the arm: network clients, the serial port, the firmware itself,
+/// the drawing that it holds, drawings that it keeps, web clients.
+pub const MAX_ASKERS: usize = MAX_CLIENTS + 4 + MAX_WEB_CLIENTS;
 
 /// One of those who may ask something of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,13 +23,24 @@ impl Client {
     pub const SERIAL: Self = Self(MAX_CLIENTS as u8);
     /// The firmware itself: waves, and settings that nobody on a connection asked to store.
     pub const HOUSE: Self = Self(MAX_CLIENTS as u8 + 1);
+    /// The drawing that the machine holds.
+    pub const JOB: Self = Self(MAX_CLIENTS as u8 + 2);
     /// A drawing from memory.
-    pub const DRAWER: Self = Self(MAX_CLIENTS as u8 + 2);
+    pub const DRAWER: Self = Self(MAX_CLIENTS as u8 + 3);
 
     /// The network client in a slot, `None` beyond [`MAX_CLIENTS`].
     pub const fn new(slot: u8) -> Option<Self> {
         if (slot as usize) < MAX_CLIENTS {
             Some(Self(slot))
+        } else {
+            None
+        }
+    }
+
+    /// The client of the web interface in a slot, `None` beyond [`MAX_WEB_CLIENTS`].
+    pub const fn web(slot: u8) -> Option<Self> {
+        if (slot as usize) < MAX_WEB_CLIENTS {
+            Some(Self(MAX_CLIENTS as u8 + 4 + slot))
         } else {
             None
         }
@@ -97,7 +111,7 @@ pub enum Errand {
     Rest,
 }
 
-/// In what way a move differs from what was asked for.
+/// In what way a move differs from what was asked for; [`Self::text`] has it in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limited {
     /// The target is out of reach: the arm goes to the closest point.
@@ -107,6 +121,17 @@ pub enum Limited {
     },
     /// The way there leaves the drawing area: it is held at the edge.
     Way,
+}
+
+impl Limited {
+    /// For people, without a double quote.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Target { lifted: true } => "out of reach: going to the closest point, pen lifted",
+            Self::Target { lifted: false } => "out of reach: going to the closest point",
+            Self::Way => "the way leaves the drawing area: held at its edge",
+        }
+    }
 }
 
 /// How an errand turned out.

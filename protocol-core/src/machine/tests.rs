@@ -436,3 +436,38 @@ fn a_stop_ends_a_dwell_and_answers_one_that_waits() {
         Some(Report::Stopped)
     );
 }
+
+#[test]
+fn an_errand_that_waits_can_be_taken_back_and_one_that_has_begun_cannot() {
+    let mut machine = arm();
+    let there = |x| line(x, 0, 1000);
+    assert!(machine.take(Client::JOB, &there(1200)).is_some());
+    assert_eq!(machine.take(Client::JOB, &there(1400)), None);
+    assert!(machine.withdraw(Client::JOB));
+    assert!(!machine.withdraw(Client::JOB));
+    let end = machine.next_event().unwrap();
+    machine.advance(end);
+    assert_eq!(machine.next_report(), None);
+    assert_eq!(machine.position(), Position::from_units(1200, 0, 1000));
+
+    machine.take(Client::JOB, &there(1400));
+    machine.take(Client::JOB, &there(1600));
+    let end = machine.next_event().unwrap();
+    machine.advance(end);
+    assert!(!machine.withdraw(Client::JOB, Client::DRAWER));
+    assert!(matches!(
+        machine.next_report(),
+        Some((Client::JOB, Client::DRAWER, Report::Moving { .. }))
+    ));
+}
+
+#[test]
+fn everybody_has_a_place_of_his_own() {
+    let network = (0..).map_while(Client::new);
+    let web = (0..).map_while(Client::web);
+    let others = [Client::SERIAL, Client::HOUSE, Client::JOB, Client::DRAWER];
+    let mut slots: std::vec::Vec<usize> =
+        network.chain(web).chain(others).map(Client::slot).collect();
+    slots.sort_unstable();
+    assert_eq!(slots, (0..MAX_ASKERS).collect::<std::vec::Vec<_>>());
+}

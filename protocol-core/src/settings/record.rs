@@ -15,6 +15,7 @@
 //! | 24 | map of heights: top left, top right, bottom right, bottom left, little-endian units of Z |
 //! | 25 | how far the nib moves as it comes down: little-endian hundredths of a millimetre |
 //! | 26 | servos that turn the other way: a bit for shoulder, elbow and pen |
+//! | 8 | whose pages may drive the arm: empty, `*`, or an origin |
 //!
 //! How it may change: a new setting gets a new tag. Firmware that does not know the tag skips it, and
 //! where a field is missing, because the record is older than the setting, the setting has its default.
@@ -22,7 +23,9 @@
 //! older firmware would misunderstand: it takes no record of a later version than its own, and every
 //! firmware takes those of all earlier ones. Version 1 was not a record yet: `parts.rs` reads it.
 
-use super::{AccessPointName, MAX_NAME, MachineName, Settings, StartMode};
+use super::{
+    AccessPointName, AllowedOrigin, MAX_NAME, MAX_ORIGIN, MachineName, Settings, StartMode,
+};
 use crate::arm::{Calibration, Directions, NibShift, ZMap};
 use crate::drawings::ButtonDraws;
 use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, MAX_PASSWORD, Network, Password};
@@ -42,6 +45,7 @@ const BUTTON: u8 = 16;
 const MAP: u8 = 24;
 const SHIFT: u8 = 25;
 const DIRECTIONS: u8 = 26;
+const ALLOWED_ORIGIN: u8 = 8;
 
 /// Tag and length.
 const HEAD: usize = 2;
@@ -55,10 +59,11 @@ pub const MAX_RECORD: usize = 1
     + (HEAD + MAX_PASSWORD)
     + (HEAD + ZMap::BYTES)
     + (HEAD + 2)
-    + (HEAD + 1);
+    + (HEAD + 1)
+    + (HEAD + MAX_ORIGIN);
 
 // Lengths are one byte.
-const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255);
+const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255 && MAX_ORIGIN <= 255);
 
 impl Settings {
     /// The record of all settings.
@@ -81,6 +86,8 @@ impl Settings {
         put(&mut record, MAP, &self.map.to_bytes());
         put(&mut record, SHIFT, &self.shift.hundredths().to_le_bytes());
         put(&mut record, DIRECTIONS, &[self.directions.to_byte()]);
+        let origin = self.allowed_origin.as_str();
+        put(&mut record, ALLOWED_ORIGIN, origin.as_bytes());
         record
     }
 
@@ -121,6 +128,9 @@ impl Settings {
                 self.shift = NibShift::from_hundredths(hundredths)?;
             }
             (DIRECTIONS, &[bits]) => self.directions = Directions::from_byte(bits)?,
+            (ALLOWED_ORIGIN, text) => {
+                self.allowed_origin = AllowedOrigin::new(core::str::from_utf8(text).ok()?)?;
+            }
             _ => return None,
         }
         Some(())

@@ -1,6 +1,7 @@
 //! The arm nobody needs hardware for: the firmware's tasks on a desktop, with real sockets, a file
 //! for flash, and a picture of what the servos did.
 
+pub mod air;
 pub mod canvas;
 pub mod clock;
 pub mod draw;

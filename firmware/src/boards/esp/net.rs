@@ -6,6 +6,7 @@ use crate::boards::embassy_tcp::{Buffers, Pool, Tcp};
 use crate::boards::embassy_udp::Multicast;
 use crate::services::dhcp::{self, MAX_PACKET, OWN_ADDRESS, OWN_PREFIX};
 use crate::services::names;
+use crate::services::web;
 use edge_nal_embassy::{Udp, UdpBuffers};
 use embassy_futures::join::join;
 use embassy_net::{Config, ConfigV4, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
@@ -15,14 +16,21 @@ use static_cell::StaticCell;
 
 /// Line-us connections: the clients, and the one that is told that there are too many.
 pub const CONNECTIONS: usize = MAX_CLIENTS + 1;
+/// Connections of browsers, and the one that is told that there are too many.
+pub const WEB_CONNECTIONS: usize = web::CONNECTIONS + 1;
 /// Services for guests, each with a socket: addresses and names.
 const FOR_GUESTS: usize = 2;
 /// Sockets: the connections, the services for guests, the DHCP client, discovery.
-const SOCKETS: usize = CONNECTIONS + FOR_GUESTS + 2;
+const SOCKETS: usize = CONNECTIONS + WEB_CONNECTIONS + FOR_GUESTS + 2;
 /// Buffer of a connection in bytes, in each direction: a segment of Ethernet.
 const BUFFER: usize = 1536;
 /// The connections.
 pub type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
+/// Buffer of a browser's connection in bytes, in each direction. Requests are short, and the page goes out
+/// in pieces of this size.
+const WEB_BUFFER: usize = 1024;
+/// The connections of browsers.
+pub type WebConnections = Tcp<WEB_CONNECTIONS, WEB_BUFFER, WEB_BUFFER>;
 /// Requests of guests that may wait to be read, for each service.
 const REQUESTS: usize = 4;
 
@@ -75,6 +83,24 @@ impl Net {
     /// When it is called twice.
     pub fn multicast(&self) -> Multicast {
         Multicast::new(self.stack)
+    }
+
+    /// The connections for browsers.
+    ///
+    /// # Panics
+    /// When it is called twice.
+    pub fn web_connections(&self) -> WebConnections {
+        static BUFFERS: StaticCell<[Buffers<WEB_BUFFER, WEB_BUFFER>; WEB_CONNECTIONS]> =
+            StaticCell::new();
+        static POOL: StaticCell<Pool<WEB_CONNECTIONS, WEB_BUFFER, WEB_BUFFER>> = StaticCell::new();
+
+        let buffers = BUFFERS.init_with(|| [const { Buffers::new() }; WEB_CONNECTIONS]);
+        Tcp::new(self.stack, POOL.init(Pool::new(buffers)))
+    }
+
+    /// The stack, to ask it for its address.
+    pub fn stack(&self) -> Stack<'static> {
+        self.stack
     }
 }
 

@@ -10,12 +10,7 @@ use protocol_core::settings::{MachineName, Settings};
 use protocol_core::wifi::{Full, Heard, MAX_NETWORKS, Network, Networks, Password, Ssid};
 
 /// Does what a line asks for, and puts the answer into `reply`.
-pub(in crate::services) async fn perform(
-    request: &Request,
-    reply: &mut Reply,
-    client: Client,
-    house: &House,
-) {
+pub async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &House) {
     let arm = &house.arm;
     match request {
         Request::Answered => {}
@@ -244,13 +239,7 @@ async fn change<'a>(
 
 /// Makes the place where the arm rests the calibration point, or removes the calibration.
 async fn calibrate(here: bool, reply: &mut Reply, client: Client, house: &House) {
-    let calibrated = house.change(client, |settings| {
-        settings.calibration = match here {
-            true => house.arm.with(|machine| machine.calibration_here()),
-            false => Default::default(),
-        };
-    });
-    match calibrated.await {
+    match house.calibrate(here, client).await {
         Ok(()) => reply.ok(),
         Err(error) => refuse_store("calibration", &error, reply),
     }

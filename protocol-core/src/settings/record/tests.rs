@@ -36,12 +36,13 @@ fn settings() -> impl Strategy<Value = Settings> {
     });
     let numbers = (1..=4u8, 1..=2u8, any::<bool>(), button);
     let fitting = (uniform4(-500..=500i16), -200..=200i16, 0..8u8);
+    let origin = prop_oneof!["", "\\*", "https?://[a-z0-9.-]{1,40}(:[0-9]{1,5})?"];
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
-        (option::of(vec(any::<u8>(), 8..=63)), fitting),
+        (option::of(vec(any::<u8>(), 8..=63)), fitting, origin),
     )
         .prop_map(
             |(
@@ -49,7 +50,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 offsets,
                 networks,
                 (start, access_point, waves, button),
-                (own, (map, shift, servos)),
+                (own, (map, shift, servos), origin),
             )| {
                 Settings {
                     name: MachineName::new(&name).unwrap(),
@@ -65,6 +66,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                     map: ZMap::new(map).unwrap(),
                     shift: NibShift::from_hundredths(shift).unwrap(),
                     directions: Directions::from_byte(servos).unwrap(),
+                    allowed_origin: AllowedOrigin::new(&origin).unwrap(),
                 }
             },
         )
@@ -160,7 +162,8 @@ fn the_bytes_of_a_record() {
         \x10\x02\x02\x07\
         \x18\x08\0\0\x64\0\x2c\x01\x38\xff\
         \x19\x02\xab\xff\
-        \x1a\x01\x02";
+        \x1a\x01\x02\
+        \x08\x13https://example.org";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -181,6 +184,7 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.map.corners(), [0, 100, 300, -200]);
     assert_eq!(settings.shift.hundredths(), -85);
     assert_eq!(settings.directions.reversed, [false, true, false]);
+    assert_eq!(settings.allowed_origin.as_str(), "https://example.org");
 }
 
 #[test]
@@ -188,6 +192,8 @@ fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
         own_password: Password::new(&[0xff; MAX_PASSWORD]),
+        allowed_origin: AllowedOrigin::new(&std::format!("http://{}", "x".repeat(MAX_ORIGIN - 7)))
+            .unwrap(),
         ..Settings::default()
     };
     for number in 0..MAX_NETWORKS {
@@ -239,6 +245,8 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x19\x02\xc9\x00",
         b"\x19\x01\x00",
         b"\x1a\x01\x08",
+        b"\x08\x04null",
+        b"\x08\x01\xff",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(
