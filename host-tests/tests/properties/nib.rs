@@ -9,7 +9,8 @@ use protocol_core::machine::SetPoint;
 /// How far the nib may stray, in drawing units: 0.05 mm.
 const STRAY: f64 = 1.0;
 /// What is closer to an edge than the largest shift, and a half of it for paper that lies below Z = 0, may be held there.
-const MARGIN: f64 = 61.0;
+/// Along the axes that is up to a half further.
+const MARGIN: f64 = 90.0;
 
 /// The nib of an arm that is built so, by its servos' pulses alone: x, y, and the height above Z = 0.
 fn nib(set_point: &SetPoint, built: &Fitting) -> [f64; 3] {
@@ -37,7 +38,7 @@ fn well_inside(x: f64, y: f64) -> bool {
 }
 
 prop_compose! {
-    fn place()(x in 560.0..1890.0, y in -1500.0..1500.0) -> Option<(f64, f64)> {
+    fn place()(x in 590.0..1860.0, y in -1500.0..1500.0) -> Option<(f64, f64)> {
         let (x, y) = (f64::round(x), f64::round(y));
         well_inside(x, y).then_some((x, y))
     }

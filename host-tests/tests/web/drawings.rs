@@ -97,7 +97,7 @@ fn a_drawing_with_a_wrong_line_is_refused_whole() {
     let (arm, _folder) = arm(&[]);
     let web = arm.web();
     for (text, line) in [
-        ("G01 X1200\nG4 P1\n", 2),
+        ("G01 X1200\nG5 P1\n", 2),
         ("G01 X1200\nM550 Px\n", 2),
         ("G01 X1200 X1\n", 1),
         ("G01 X1200\n\nG01 Y", 3),

@@ -21,12 +21,13 @@ pub struct RefusedLine {
     pub reason: heapless::String<MAX_REASON>,
 }
 
-/// What belongs into a drawing: moves, speed, scale and origin.
+/// What belongs into a drawing: moves, dwells, speed, scale and origin.
 fn belongs(request: &Request, reply: &Reply) -> Result<(), &'static str> {
     match request {
-        Request::Errand(Errand::Move(..)) | Request::SetSpeed { .. } => Ok(()),
+        Request::Errand(Errand::Move(..) | Errand::Uncalibrated(..) | Errand::Dwell(_))
+        | Request::SetSpeed { .. } => Ok(()),
         Request::Answered if !reply.is_error() => Ok(()),
-        _ => Err("a drawing has G00, G01, G28, G54, G94 and comments alone"),
+        _ => Err("a drawing has G00, G01, G4, G28, G40, G54, G94 and comments alone"),
     }
 }
 
@@ -180,14 +181,14 @@ mod tests {
     #[test]
     fn a_line_that_is_wrong_is_named() {
         let refused = |text| refused(text).map(|refused| (refused.line, refused.reason));
-        let only = "a drawing has G00, G01, G28, G54, G94 and comments alone";
+        let only = "a drawing has G00, G01, G4, G28, G40, G54, G94 and comments alone";
         assert_eq!(
-            refused("G28\nG01 X1 Y2 Z3\nG00 X5\nG54 S2\nG94 S5\n\n(a)\n"),
+            refused("G28\nG01 X1 Y2 Z3\nG00 X5\nG54 S2\nG94 S5\nG4 P1\n\n(a)\n"),
             None
         );
         for (text, line, reason) in [
-            ("G28\n\nG4 P500\n", 3, "unknown command 'G4'"),
-            ("G01 X1 X2\nG4\n", 1, "parameter X is repeated"),
+            ("G28\n\nG5 P500\n", 3, "unknown command 'G5'"),
+            ("G01 X1 X2\nG5\n", 1, "parameter X is repeated"),
             ("G28\nM550 Px\n", 2, only),
             ("M114\n", 1, only),
         ] {
