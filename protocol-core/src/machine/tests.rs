@@ -454,10 +454,10 @@ fn an_errand_that_waits_can_be_taken_back_and_one_that_has_begun_cannot() {
     machine.take(Client::JOB, &there(1600));
     let end = machine.next_event().unwrap();
     machine.advance(end);
-    assert!(!machine.withdraw(Client::JOB, Client::DRAWER));
+    assert!(!machine.withdraw(Client::JOB));
     assert!(matches!(
         machine.next_report(),
-        Some((Client::JOB, Client::DRAWER, Report::Moving { .. }))
+        Some((Client::JOB, Report::Moving { .. }))
     ));
 }
 
