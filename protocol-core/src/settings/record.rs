@@ -63,8 +63,11 @@ impl Settings {
         put(&mut record, START, &[self.start.number()]);
         put(&mut record, ACCESS_POINT, &[self.access_point.number()]);
         put(&mut record, WAVES, &[self.waves.into()]);
-        let origin = self.allowed_origin.as_str();
-        put(&mut record, ALLOWED_ORIGIN, origin.as_bytes());
+        // Absent, it is the default.
+        if self.allowed_origin != AllowedOrigin::None {
+            let origin = self.allowed_origin.as_str();
+            put(&mut record, ALLOWED_ORIGIN, origin.as_bytes());
+        }
         record
     }
 
