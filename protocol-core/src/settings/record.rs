@@ -86,8 +86,11 @@ impl Settings {
         put(&mut record, MAP, &self.map.to_bytes());
         put(&mut record, SHIFT, &self.shift.hundredths().to_le_bytes());
         put(&mut record, DIRECTIONS, &[self.directions.to_byte()]);
-        let origin = self.allowed_origin.as_str();
-        put(&mut record, ALLOWED_ORIGIN, origin.as_bytes());
+        // Absent, it is the default.
+        if self.allowed_origin != AllowedOrigin::None {
+            let origin = self.allowed_origin.as_str();
+            put(&mut record, ALLOWED_ORIGIN, origin.as_bytes());
+        }
         record
     }
 

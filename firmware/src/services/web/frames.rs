@@ -165,6 +165,23 @@ impl Frames {
     }
 }
 
+/// Puts the head of a text frame in front of the text that begins at [`MAX_HEAD`] of `room`, and gives the
+/// whole frame.
+pub fn frame_in_place(room: &mut [u8], length: usize) -> &[u8] {
+    let head = FrameHeader {
+        frame_type: FrameType::Text(false),
+        payload_len: length as u64,
+        mask_key: None,
+    };
+    let mut bytes = [0; FrameHeader::MAX_LEN];
+    let long = head.serialize(&mut bytes).unwrap_or_default();
+    let start = MAX_HEAD.saturating_sub(long);
+    if let (Some(place), Some(head)) = (room.get_mut(start..MAX_HEAD), bytes.get(..long)) {
+        place.copy_from_slice(head);
+    }
+    room.get(start..MAX_HEAD + length).unwrap_or_default()
+}
+
 /// Puts a frame into `out`, which has room for it: `payload` and [`MAX_HEAD`] bytes.
 pub fn put<const N: usize>(out: &mut Vec<u8, N>, kind: FrameType, payload: &[u8]) {
     let head = FrameHeader {
@@ -285,6 +302,15 @@ mod tests {
         put(&mut out, FrameType::Text(false), &[b'x'; 300]);
         assert_eq!(&out[..6], b"\x81\x7e\x01\x2cxx");
         assert_eq!(out.len(), 304);
+        for length in [0, 5, 125, 126, 300] {
+            let mut room = [b'x'; 400];
+            put(
+                &mut out,
+                FrameType::Text(false),
+                &room[MAX_HEAD..MAX_HEAD + length],
+            );
+            assert_eq!(frame_in_place(&mut room, length), out, "{length}");
+        }
     }
 
     proptest! {

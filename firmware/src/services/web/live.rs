@@ -1,7 +1,7 @@
 //! The state, pushed over a WebSocket as it changes.
 
 use super::exchange::Room;
-use super::frames::{Frames, MAX_HEAD, put};
+use super::frames::{Frames, MAX_CONTROL, MAX_HEAD, frame_in_place, put};
 use super::state::{MAX_STATE, Snapshot, write_state};
 use crate::services::House;
 use crate::services::line_us::Answers;
@@ -35,7 +35,7 @@ const MAX_MESSAGE: usize = MAX_STATE + MAX_HEAD;
 pub async fn serve<S: Read + Write>(socket: S, room: &mut Room, here: usize, house: &House) {
     let mut live = Live {
         answers: Answers::new(socket),
-        message: Vec::new(),
+        control: Vec::new(),
         frames: Frames::new(),
         trail: Vec::new(),
         told: None,
@@ -68,7 +68,8 @@ struct Closed;
 
 struct Live<S> {
     answers: Answers<S, MAX_MESSAGE>,
-    message: Vec<u8, MAX_MESSAGE>,
+    /// A frame that answers a ping or an end.
+    control: Vec<u8, { MAX_CONTROL + MAX_HEAD }>,
     frames: Frames,
     /// Where the pen was since the last message.
     trail: Vec<[i32; 3], MAX_TRAIL>,
@@ -97,13 +98,13 @@ impl<S: Read + Write> Live<S> {
             match self.frames.next(input) {
                 Ok(None) => return Ok(()),
                 Ok(Some(Event::Ping(content))) => {
-                    put(&mut self.message, FrameType::Pong, &content);
-                    self.answers.send_message(&self.message).await;
+                    put(&mut self.control, FrameType::Pong, &content);
+                    self.answers.send_message(&self.control).await;
                 }
                 Ok(Some(_)) => {}
                 Err(code) => {
-                    put(&mut self.message, FrameType::Close, &code.0.to_be_bytes());
-                    self.answers.send_message(&self.message).await;
+                    put(&mut self.control, FrameType::Close, &code.0.to_be_bytes());
+                    self.answers.send_message(&self.control).await;
                     return Err(Closed);
                 }
             }
@@ -128,8 +129,10 @@ impl<S: Read + Write> Live<S> {
                 trail: &self.trail,
                 moving,
             };
-            let length = serde_json_core::to_slice(&PenMessage { pen }, room).unwrap_or(0);
-            self.send(room, length).await;
+            let length = serde_json_core::to_slice(&PenMessage { pen }, text(room)).unwrap_or(0);
+            self.answers
+                .send_message(frame_in_place(room, length))
+                .await;
             self.trail.clear();
         }
         self.tell_state(house, room).await;
@@ -143,23 +146,24 @@ impl<S: Read + Write> Live<S> {
         }
         let mut snapshot = Snapshot::of(house);
         let passing = snapshot.at_rest();
-        let length = write_state(&snapshot, room);
-        let hash = hash(room.get(..length).unwrap_or_default());
+        let length = write_state(&snapshot, text(room));
+        let hash = hash(text(room).get(..length).unwrap_or_default());
         if hash == self.hash && age.is_some_and(|age| age < STATE_AT_LEAST) {
             return;
         }
         (self.hash, self.state_at) = (hash, Some(Instant::now()));
         snapshot.restore(passing);
-        let length = write_state(&snapshot, room);
+        let length = write_state(&snapshot, text(room));
         drop(snapshot);
-        self.send(room, length).await;
+        self.answers
+            .send_message(frame_in_place(room, length))
+            .await;
     }
+}
 
-    async fn send(&mut self, room: &Room, length: usize) {
-        let text = room.get(..length).unwrap_or_default();
-        put(&mut self.message, FrameType::Text(false), text);
-        self.answers.send_message(&self.message).await;
-    }
+/// Where the text of a message is written: behind the place for its head.
+fn text(room: &mut Room) -> &mut [u8] {
+    room.get_mut(MAX_HEAD..).unwrap_or_default()
 }
 
 /// FNV-1a: whether two states differ, nothing more.
