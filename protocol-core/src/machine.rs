@@ -277,6 +277,12 @@ impl Machine {
         self.active.is_some() || self.plan.has_the_arm()
     }
 
+    /// Whether a wave is under way.
+    pub fn is_waving(&self) -> bool {
+        let waves = |active: &Active| matches!(active.motion, Motion::Wave(_));
+        self.active.as_ref().is_some_and(waves)
+    }
+
     /// Whether the arm rests, may move, and nobody wants it to do either.
     pub fn is_idle(&self) -> bool {
         !self.is_busy() && self.resting_for.is_none() && self.stopped.is_none()

@@ -120,6 +120,10 @@ impl House {
         self.greeted.store(true, Ordering::Relaxed);
         if !greeted && self.wave() {
             Timer::after_micros(WAVE.get()).await;
+            // Frames may be late, and whoever has heard the greeting takes the arm to be at home.
+            while self.arm.with(|machine| machine.is_waving()) {
+                Timer::after_millis(1).await;
+            }
         }
     }
 
