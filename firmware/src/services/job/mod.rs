@@ -1,6 +1,6 @@
 //! A drawing that the machine holds and draws by itself, whoever sent it.
 //!
-//! It is one more client of the arm ([`Client::JOB`]): its lines go through a session of their own and
+//! It is one more client of the arm ([`protocol_core::machine::Client::JOB`]): its lines go through a session of their own and
 //! are done as any client's. What is held is bounded; a larger drawing comes in pieces while the arm draws.
 //! `docs/api.md` is the contract.
 
