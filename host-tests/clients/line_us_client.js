@@ -24,7 +24,7 @@ arm.on('connected', async () => {
     assert.match((await arm.getDiagnostics()).Uptime, /^0d0h/)
     assert.strictEqual((await arm.setMachineName('robs-lineus')).MACHINENAME, 'robs-lineus')
     await assert.rejects(arm.listWifiNetworks(), /M587 is refused over the WebSocket/)
-    await assert.rejects(arm.send({ g: 'G4' }), /unknown command 'G4'/)
+    await assert.rejects(arm.send({ g: 'G5' }), /unknown command 'G5'/)
     // Far out of reach: it goes to the edge, and the library goes on.
     await arm.to({ x: 5000, y: 1000 })
     assert.strictEqual(arm.coordinates.x, 1300)
