@@ -19,4 +19,5 @@ pub mod motion;
 pub mod panel;
 pub mod settings;
 pub mod text;
+pub mod update;
 pub mod wifi;
