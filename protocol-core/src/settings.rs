@@ -6,6 +6,7 @@ mod record;
 pub use record::MAX_RECORD;
 
 use crate::arm::Calibration;
+use crate::update::ManifestAddress;
 use crate::wifi::Networks;
 use heapless::String;
 
@@ -125,6 +126,8 @@ pub struct Settings {
     pub access_point: AccessPointName,
     /// Whether it makes its little waves (M291).
     pub waves: bool,
+    /// Where updates are asked for (M997).
+    pub update_address: Option<ManifestAddress>,
 }
 
 impl Default for Settings {
@@ -137,6 +140,7 @@ impl Default for Settings {
             start: StartMode::default(),
             access_point: AccessPointName::default(),
             waves: true,
+            update_address: None,
         }
     }
 }

@@ -6,6 +6,7 @@
 use crate::board::{Frames, Servos};
 use core::array;
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::{Mutex as Turns, MutexGuard as Turn};
@@ -20,6 +21,7 @@ pub struct Arm {
     reports: [Signal<CriticalSectionRawMutex, Report>; MAX_ASKERS],
     /// Several services ask in the name of [`Client::HOUSE`], which has one errand at a time as well.
     house: Turns<CriticalSectionRawMutex, ()>,
+    ticks: AtomicU32,
 }
 
 impl Arm {
@@ -29,6 +31,7 @@ impl Arm {
             machine: Mutex::new(RefCell::new(machine)),
             reports: array::from_fn(|_| Signal::new()),
             house: Turns::new(()),
+            ticks: AtomicU32::new(0),
         }
     }
 
@@ -75,6 +78,11 @@ impl Arm {
         })
     }
 
+    /// Counts frames that had their set-point: what stands still is dead.
+    pub fn ticks(&self) -> u32 {
+        self.ticks.load(Ordering::Relaxed)
+    }
+
     /// The servo tick: one set-point in each of the servos' frames, which are `length` apart, for ever.
     ///
     /// The machine's time is the number of frames, so that a set-point is a function of the moves and
@@ -92,6 +100,9 @@ impl Arm {
             let began = Instant::now();
             let set_point = self.with(|machine| machine.tick(time));
             servos.write(time, &set_point);
+            // The tick alone counts, so load and store need not be one step.
+            self.ticks
+                .store(self.ticks().wrapping_add(1), Ordering::Relaxed);
             self.deliver();
             while let Some(event) = self.with(|machine| machine.next_event()) {
                 if event >= time + length {

@@ -6,6 +6,7 @@ pub mod line_us;
 pub mod network;
 pub mod panel;
 pub mod storage;
+pub mod update;
 
 use crate::board::Vitals;
 use arm::Arm;
@@ -21,6 +22,7 @@ use protocol_core::machine::{ArmData, Client, Machine};
 use protocol_core::motion::WAVE;
 use protocol_core::settings::{MachineName, Settings};
 use storage::{Store, StoreError};
+use update::Update;
 
 /// What the services of one arm share.
 pub struct House {
@@ -32,6 +34,8 @@ pub struct House {
     pub wifi: Wifi,
     /// Light and button.
     pub panel: Panel,
+    /// New firmware.
+    pub update: Update,
     /// Who this machine is.
     pub identity: Identity,
     /// How it is.
@@ -49,6 +53,7 @@ impl House {
             store: Store::new(),
             wifi: Wifi::new(),
             panel: Panel::new(),
+            update: Update::new(),
             identity,
             vitals,
             settings: Mutex::new(RefCell::new(settings)),

@@ -6,6 +6,7 @@ use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
 use crate::settings::{MachineName, Settings};
 use crate::text::{MAX_EXCERPT, excerpt, excerpt_of_bytes};
+use crate::update::{self, KeyName, Version};
 use crate::wifi::{Heard, Joined, MAX_NETWORKS, MAX_SSID, Networks, Phase, Ssid, Status};
 use core::fmt::{self, Write};
 use heapless::Vec;
@@ -20,7 +21,7 @@ const _: () = assert!(
     "ok ".len() + MAX_NETWORKS * (" \"\":1".len() + 2 * MAX_SSID) + TERMINATOR.len() <= MAX_REPLY
 );
 /// Version in the greeting: the level of the original's protocol that is complete, then our own.
-pub const VERSION: &str = concat!("1.0.4 Quill ", env!("CARGO_PKG_VERSION"));
+pub const VERSION: &str = concat!("1.0.4 Quill ", env!("QUILL_VERSION"));
 
 /// Longest piece of a panic's text that diagnostics tell, in characters.
 const MAX_PANIC: usize = 120;
@@ -63,6 +64,10 @@ pub struct Diagnostics<'a> {
     pub reset_reason: &'a str,
     /// How the memory for the settings is.
     pub memory: &'a str,
+    /// How updates stand.
+    pub update: &'a update::Status,
+    /// Whose signature is believed.
+    pub update_key: KeyName,
     /// The last words of a firmware that panicked before, if there are any.
     pub last_panic: &'a str,
 }
@@ -233,7 +238,7 @@ impl Reply {
             "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
              WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
-             Memory:\"{}\"{}",
+             Memory:\"{}\" Update:\"{}\" UpdateKey:{}{}",
             state.name.as_str(),
             state.identity.serial(),
             Uptime(state.uptime),
@@ -246,7 +251,16 @@ impl Reply {
             state.free_memory,
             state.reset_reason,
             state.memory,
+            state.update,
+            state.update_key,
             LastPanic(state.last_panic),
+        ));
+    }
+
+    /// A new firmware is in place.
+    pub fn updated(&mut self, version: Version) {
+        self.compose(format_args!(
+            "ok INFO:\"{version} is in place and starts now\""
         ));
     }
 
@@ -607,11 +621,20 @@ mod tests {
                 free_memory: u32::MAX,
                 reset_reason: "the watchdog bit after a long silence",
                 memory: "worn out, and what is worse, it does not take what is stored",
+                update: &update::Status {
+                    progress: update::Progress::Idle,
+                    standing: update::Standing::Settled,
+                    refused: Some(update::Rejection::WrongLength {
+                        served: u32::MAX,
+                        expected: u32::MAX,
+                    }),
+                },
+                update_key: KeyName::Own([0xff; 4]),
                 last_panic: &"panicked at \"somewhere\"\n".repeat(9),
             });
         });
         assert!(
-            text.contains("stored\" LastPanic:\"panicked at 'somewhere'?")
+            text.contains("UpdateKey:ffffffff LastPanic:\"panicked at 'somewhere'?")
                 && text.ends_with("...\""),
             "{text}"
         );

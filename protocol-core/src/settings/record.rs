@@ -10,6 +10,7 @@
 //! | 4 | what it is after power-on: 1 to 4, as `M552 S` |
 //! | 5 | how its own network is called: 1 or 2, as `M552 P` |
 //! | 6 | waves: 0 or 1 |
+//! | 32 | where updates are asked for; no field, nowhere |
 //!
 //! How it may change: a new setting gets a new tag. Firmware that does not know the tag skips it, and
 //! where a field is missing, because the record is older than the setting, the setting has its default.
@@ -19,6 +20,7 @@
 
 use super::{AccessPointName, MAX_NAME, MachineName, Settings, StartMode};
 use crate::arm::Calibration;
+use crate::update::{MAX_ADDRESS, ManifestAddress};
 use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, Network};
 use heapless::Vec;
 
@@ -31,6 +33,7 @@ const NETWORK: u8 = 3;
 const START: u8 = 4;
 const ACCESS_POINT: u8 = 5;
 const WAVES: u8 = 6;
+const UPDATE_ADDRESS: u8 = 32;
 
 /// Tag and length.
 const HEAD: usize = 2;
@@ -39,10 +42,11 @@ pub const MAX_RECORD: usize = 1
     + (HEAD + MAX_NAME)
     + (HEAD + Calibration::BYTES)
     + MAX_NETWORKS * (HEAD + MAX_NETWORK)
-    + 3 * (HEAD + 1);
+    + 3 * (HEAD + 1)
+    + (HEAD + MAX_ADDRESS);
 
 // Lengths are one byte.
-const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255);
+const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255 && MAX_ADDRESS <= 255);
 
 impl Settings {
     /// The record of all settings.
@@ -58,6 +62,9 @@ impl Settings {
         put(&mut record, START, &[self.start.number()]);
         put(&mut record, ACCESS_POINT, &[self.access_point.number()]);
         put(&mut record, WAVES, &[self.waves.into()]);
+        if let Some(address) = &self.update_address {
+            put(&mut record, UPDATE_ADDRESS, address.as_str().as_bytes());
+        }
         record
     }
 
@@ -90,6 +97,10 @@ impl Settings {
             (START, &[number]) => self.start = StartMode::from_number(number)?,
             (ACCESS_POINT, &[number]) => self.access_point = AccessPointName::from_number(number)?,
             (WAVES, &[flag @ (0 | 1)]) => self.waves = flag == 1,
+            (UPDATE_ADDRESS, text) => {
+                let address = ManifestAddress::new(core::str::from_utf8(text).ok()?)?;
+                self.update_address = Some(address);
+            }
             _ => return None,
         }
         Some(())

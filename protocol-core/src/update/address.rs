@@ -3,7 +3,7 @@
 use heapless::String;
 
 /// Longest address, in bytes.
-pub const MAX_ADDRESS: usize = 128;
+pub const MAX_ADDRESS: usize = 96;
 /// Longest name of a host, in bytes.
 pub const MAX_HOST: usize = 64;
 /// Longest name of an image, in bytes.
@@ -19,7 +19,8 @@ const PORT: u16 = 80;
 /// digits, points and inner hyphens. Path: letters, digits and `/ . _ - ~ + %`; no query, no user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ManifestAddress {
-    text: String<MAX_ADDRESS>,
+    // Its length in one byte: commands are moved about.
+    text: String<MAX_ADDRESS, u8>,
     // Where the parts lie in the text.
     host_end: u8,
     path_start: u8,

@@ -9,6 +9,8 @@ pub const SILENCE: Micros = Micros::from_secs(10);
 pub const MANIFEST_TIME: Micros = Micros::from_secs(20);
 /// An image comes within this time: 1280 kB at 4.4 kB/s.
 pub const IMAGE_TIME: Micros = Micros::from_secs(300);
+/// The arm comes to rest with its pen up within this time.
+pub const ARM_TIME: Micros = Micros::from_secs(60);
 /// Longest head of an answer, in bytes.
 pub const MAX_HEAD: usize = 1024;
 /// Most header lines of an answer.
@@ -76,13 +78,23 @@ pub struct Download {
 
 impl Download {
     /// Begins; `limit` is the time for all of it.
-    pub fn new(now: Micros, expected: u32, limit: Micros) -> Self {
+    pub fn begin(now: Micros, limit: Micros) -> Self {
         Self {
-            expected,
+            expected: 0,
             received: 0,
             until: now + limit,
             limit,
         }
+    }
+
+    /// Its length is known.
+    pub const fn of(self, expected: u32) -> Self {
+        Self { expected, ..self }
+    }
+
+    /// Bytes of all of it.
+    pub const fn expected(&self) -> u32 {
+        self.expected
     }
 
     /// Bytes that have yet to come.
@@ -181,7 +193,7 @@ mod tests {
     #[test]
     fn a_download_has_its_time_and_its_length() {
         let at = Micros::from_secs;
-        let mut download = Download::new(at(50), 1000, at(25));
+        let mut download = Download::begin(at(50), at(25)).of(1000);
         assert_eq!(download.patience(at(50)), Ok(SILENCE));
         assert_eq!(download.take(600), Ok(()));
         assert_eq!((download.missing(), download.percent()), (400, 60));

@@ -80,10 +80,10 @@ impl<'a> Unverified<'a> {
         let board = lines.value("board: ", |text| is_board(text).then_some(text))?;
         let version = lines.value("version: ", Version::parse)?;
         let size = lines.value("size: ", size)?;
-        let sha256 = lines.value("sha256: ", hexadecimal)?;
+        let sha256 = lines.value("sha256: ", |text| hexadecimal(text.as_bytes()))?;
         let image = lines.value("image: ", ImageName::new)?;
         let signed = bytes.len() - lines.rest.len();
-        let signature = lines.value("signature: ", hexadecimal)?;
+        let signature = lines.value("signature: ", |text| hexadecimal(text.as_bytes()))?;
         if !lines.rest.is_empty() {
             return Err(Rejection::BadManifest(LINES + 1));
         }
@@ -181,23 +181,34 @@ fn size(text: &str) -> Option<u32> {
 }
 
 /// Exactly `N` bytes in lower-case hexadecimal digits.
-pub fn hexadecimal<const N: usize>(text: &str) -> Option<[u8; N]> {
-    let digits = text.as_bytes();
-    if digits.len() != 2 * N {
-        return None;
-    }
+pub const fn hexadecimal<const N: usize>(text: &[u8]) -> Option<[u8; N]> {
+    let mut digits = text;
     let mut bytes = [0; N];
-    for (byte, pair) in bytes.iter_mut().zip(digits.chunks_exact(2)) {
-        for digit in pair {
-            let value = match digit {
-                b'0'..=b'9' => digit - b'0',
-                b'a'..=b'f' => digit - b'a' + 10,
-                _ => return None,
-            };
-            *byte = *byte << 4 | value;
-        }
+    let mut free: &mut [u8] = &mut bytes;
+    while let [high, low, more @ ..] = digits {
+        let (Some(high), Some(low)) = (nibble(*high), nibble(*low)) else {
+            return None;
+        };
+        let Some((byte, others)) = free.split_first_mut() else {
+            return None;
+        };
+        *byte = high << 4 | low;
+        free = others;
+        digits = more;
     }
-    Some(bytes)
+    if digits.is_empty() && free.is_empty() {
+        Some(bytes)
+    } else {
+        None
+    }
+}
+
+const fn nibble(digit: u8) -> Option<u8> {
+    match digit {
+        b'0'..=b'9' => Some(digit - b'0'),
+        b'a'..=b'f' => Some(digit - b'a' + 10),
+        _ => None,
+    }
 }
 
 #[cfg(test)]

@@ -12,7 +12,9 @@ mod version;
 
 pub use address::{ImageName, MAX_ADDRESS, MAX_HOST, MAX_IMAGE_NAME, MAX_PATH, ManifestAddress};
 pub use boot::{BootChoice, ENTRY, PAGE, STARTS, Slot, Standing, Start, Step, Steps};
-pub use download::{Download, Head, IMAGE_TIME, MANIFEST_TIME, MAX_HEAD, MAX_HEADERS, SILENCE};
+pub use download::{
+    ARM_TIME, Download, Head, IMAGE_TIME, MANIFEST_TIME, MAX_HEAD, MAX_HEADERS, SILENCE,
+};
 pub use manifest::{
     Hash, MAX_BOARD, MAX_MANIFEST, Manifest, Running, Signature, Unverified, hexadecimal,
 };

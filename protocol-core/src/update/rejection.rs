@@ -16,12 +16,14 @@ pub enum Rejection {
     /// The running firmware is new and has not confirmed itself: what would be overwritten is the one to
     /// come back to.
     OnTrial,
-    /// There is no network.
-    NoNetwork,
+    /// The arm is drawing, or its pen is down, and that does not end.
+    Drawing,
     /// The host's name is not known.
     UnknownHost,
     /// No connection to the server.
     NoServer,
+    /// The server ends the connection without an answer.
+    NoAnswer,
     /// The connection ended before everything had come.
     Truncated {
         /// Bytes that have come.
@@ -79,14 +81,13 @@ impl fmt::Display for Rejection {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::NoSlots => out.write_str("this board has no place for another firmware"),
-            Self::NoAddress => {
-                out.write_str("no address is kept: M997 S'http://...' with double quotes sets it")
-            }
+            Self::NoAddress => out.write_str("no address is kept for updates, M997 S sets one"),
             Self::UnderWay => out.write_str("an update is under way"),
             Self::OnTrial => out.write_str("the firmware is on trial, try again in a minute"),
-            Self::NoNetwork => out.write_str("there is no network"),
+            Self::Drawing => out.write_str("the arm is drawing, or its pen is down"),
             Self::UnknownHost => out.write_str("the server's name is not known"),
             Self::NoServer => out.write_str("no connection to the server"),
+            Self::NoAnswer => out.write_str("the server ends the connection without an answer"),
             Self::Truncated { received, expected } => {
                 write!(
                     out,

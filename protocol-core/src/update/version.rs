@@ -25,12 +25,34 @@ impl Version {
         }
     }
 
+    /// The version of this firmware: the package's, unless the build was told another one (`build.rs`).
+    ///
+    /// # Panics
+    /// Never: what is no version does not compile.
+    pub const FIRMWARE: Self = match Self::parse(env!("QUILL_VERSION")) {
+        Some(version) => version,
+        None => panic!("QUILL_VERSION is not three numbers with points between them"),
+    };
+
     /// Three numbers with points between them, without signs, blanks or leading zeros; `None` for anything
     /// else.
-    pub fn parse(text: &str) -> Option<Self> {
-        let mut numbers = text.split('.').map(number);
-        let version = Self::new(numbers.next()??, numbers.next()??, numbers.next()??);
-        numbers.next().is_none().then_some(version)
+    pub const fn parse(text: &str) -> Option<Self> {
+        let (Some(major), rest) = number(text.as_bytes()) else {
+            return None;
+        };
+        let [b'.', rest @ ..] = rest else {
+            return None;
+        };
+        let (Some(minor), rest) = number(rest) else {
+            return None;
+        };
+        let [b'.', rest @ ..] = rest else {
+            return None;
+        };
+        match number(rest) {
+            (Some(patch), []) => Some(Self::new(major, minor, patch)),
+            _ => None,
+        }
     }
 
     /// Its form in memory: three little-endian numbers.
@@ -51,10 +73,23 @@ impl Version {
     }
 }
 
-fn number(text: &str) -> Option<u16> {
-    let is_plain = text.bytes().all(|byte| byte.is_ascii_digit());
-    let is_short = text == "0" || !text.starts_with('0');
-    (is_plain && is_short).then(|| text.parse().ok()).flatten()
+/// The digits in front, if they are a number, and what follows them.
+const fn number(text: &[u8]) -> (Option<u16>, &[u8]) {
+    let mut rest = text;
+    let mut number = 0_u32;
+    let mut digits = 0;
+    while let [digit @ b'0'..=b'9', more @ ..] = rest {
+        number = number
+            .saturating_mul(10)
+            .saturating_add((*digit - b'0') as u32);
+        digits += 1;
+        rest = more;
+    }
+    let has_leading_zero = digits > 1 && matches!(text, [b'0', ..]);
+    if digits == 0 || has_leading_zero || number > u16::MAX as u32 {
+        return (None, rest);
+    }
+    (Some(number as u16), rest)
 }
 
 impl fmt::Display for Version {

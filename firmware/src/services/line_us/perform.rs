@@ -1,6 +1,7 @@
 //! What a line asks for is done here.
 
 use crate::services::House;
+use crate::services::update::KEY_NAME;
 use core::fmt::Display;
 use protocol_core::lineus::{Diagnostics, Refusal, Reply, Request};
 use protocol_core::machine::Client;
@@ -62,6 +63,17 @@ pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client
             change("networks", forget, reply, client, house).await;
             house.wifi.changed();
         }
+        Request::Update => match house.update.ask().await {
+            Ok(version) => reply.updated(version),
+            Err(rejection) => reply.error(format_args!("{rejection}")),
+        },
+        Request::SetUpdateAddress(address) => {
+            let set = |settings: &mut Settings| {
+                settings.update_address = address.clone();
+                Ok(())
+            };
+            change("address", set, reply, client, house).await;
+        }
         Request::Calibrate => calibrate(true, reply, client, house).await,
         Request::ClearCalibration => calibrate(false, reply, client, house).await,
     }
@@ -82,6 +94,8 @@ fn diagnose(reply: &mut Reply, house: &House) {
         free_memory: (house.vitals.free_memory)(),
         reset_reason: house.vitals.reset_reason,
         memory: house.store.health().text(),
+        update: &house.update.status(),
+        update_key: KEY_NAME,
         last_panic: house.vitals.last_panic,
     });
 }

@@ -30,14 +30,16 @@ fn networks() -> impl Strategy<Value = Networks> {
 
 fn settings() -> impl Strategy<Value = Settings> {
     let numbers = (1..=4u8, 1..=2u8, any::<bool>());
+    let address = option::of("http://[a-z0-9]{1,20}(:[1-9][0-9]{0,3})?/[a-z0-9._/-]{0,60}");
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
+        address,
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves))| Settings {
+            |(name, offsets, networks, (start, access_point, waves), address)| Settings {
                 name: MachineName::new(&name).unwrap(),
                 calibration: Calibration {
                     offsets: Angles::from_array(offsets.map(Microdegrees::new)),
@@ -46,6 +48,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 start: StartMode::from_number(start).unwrap(),
                 access_point: AccessPointName::from_number(access_point).unwrap(),
                 waves,
+                update_address: address.map(|text| ManifestAddress::new(&text).unwrap()),
             },
         )
 }
@@ -97,7 +100,7 @@ proptest! {
     #[test]
     fn tags_of_later_firmware_are_skipped(
         settings in settings(),
-        tag in 7..=255u8,
+        tag in 100..=255u8,
         value in vec(any::<u8>(), 0..=255),
         place: prop::sample::Index,
     ) {
@@ -135,7 +138,8 @@ fn the_bytes_of_a_record() {
         \x03\x05\x04open\
         \x04\x01\x04\
         \x05\x01\x02\
-        \x06\x01\x00";
+        \x06\x01\x00\
+        \x20\x0ahttp://a/b";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -150,12 +154,15 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.start, StartMode::StationLongPress);
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
+    let address = settings.update_address.as_ref().unwrap();
+    assert_eq!(address.as_str(), "http://a/b");
 }
 
 #[test]
 fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
+        update_address: ManifestAddress::new(&std::format!("http://a/{:x<87}", "")),
         ..Settings::default()
     };
     for number in 0..MAX_NETWORKS {
@@ -200,6 +207,8 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x05\x01\x03",
         b"\x06\x01\x02",
         b"\x06\x00",
+        b"\x20\x00",
+        b"\x20\x03ftp",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(
