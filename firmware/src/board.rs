@@ -102,12 +102,13 @@ pub trait Address {
     reason = "awaited in place by the update service alone, so no bound is missing"
 )]
 pub trait FirmwareSlots {
-    /// What manifests call this board.
-    const BOARD: &'static str;
     /// The flash of a slot.
     type Slot: NorFlash;
     /// The flash of the boot choice, two pages of 4 kB.
     type Choice: MultiwriteNorFlash;
+
+    /// What manifests call this board.
+    fn board(&self) -> &'static str;
 
     /// The slot that runs.
     fn running(&self) -> Slot;

@@ -10,8 +10,10 @@ use embassy_time::{Duration, Timer};
 use firmware::boards::SETTINGS;
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
+use firmware::boards::slots::PartitionedSlots;
 use firmware::boards::virt::flash::Flash;
 use firmware::boards::virt::net::VirtNet;
+use firmware::boards::virt::slots::{self, FlashPartition};
 use firmware::boards::virt::world::button::Button;
 use firmware::boards::virt::world::light::Light;
 use firmware::boards::virt::world::servos::Servos;
@@ -21,9 +23,10 @@ use firmware::services::House;
 use firmware::services::arm::TimedFrames;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::storage::Memory;
-use firmware::services::{network, panel};
+use firmware::services::{network, panel, update};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
+use protocol_core::update::{Slot, Standing};
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// As on the desktop, so that pulses can be compared bit by bit.
@@ -57,7 +60,10 @@ fn main() -> ! {
 /// Reads the settings, then starts everything else.
 #[embassy_executor::task]
 async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtNet, disk: Flash) {
-    let Some(mut memory) = Memory::new(disk, SETTINGS) else {
+    let chip = slots::share(disk);
+    let settings = slots::partition(chip, SETTINGS);
+    let whole = 0..settings.size();
+    let Some(mut memory) = Memory::new(settings, whole) else {
         log::error!("the settings do not lie in whole pages");
         return;
     };
@@ -68,8 +74,18 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
             Timer::after_millis(1).await;
         }
     };
-    let settings = match select(memory.load(), alarm).await {
-        Either::First((settings, _)) => settings,
+    let read = async {
+        let mut choice = slots::choice(chip);
+        let running = update::choice(&mut choice).await;
+        let running = running.map_or(Slot::First, |choice| choice.slot());
+        let Some(standing) = update::at_start(&mut choice, running).await else {
+            log::info!("the new firmware did not confirm itself: back to the old one");
+            virt::power::exit(virt::power::RESTART_STATUS);
+        };
+        (memory.load().await.0, running, standing)
+    };
+    let (settings, running, standing) = match select(read, alarm).await {
+        Either::First(read) => read,
         Either::Second(never) => never,
     };
     let identity = Identity {
@@ -82,7 +98,9 @@ async fn boot(spawner: Spawner, tick: embassy_executor::SendSpawner, card: VirtN
         identity,
         virt::VITALS,
     ));
-    if start(spawner, tick, house, memory, card).is_err() {
+    let slots = slots::slots(chip, running);
+    let updates = (slots, standing);
+    if start(spawner, tick, house, memory, card, updates).is_err() {
         log::error!("a task does not fit");
     }
 }
@@ -91,10 +109,12 @@ fn start(
     spawner: Spawner,
     tick: embassy_executor::SendSpawner,
     house: &'static House,
-    memory: Memory<Flash>,
+    memory: Memory<FlashPartition>,
     card: VirtNet,
+    (slots, standing): (PartitionedSlots<Flash>, Standing),
 ) -> Result<(), SpawnError> {
-    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 2 }>> = StaticCell::new();
+    // The connections, one for updates, DHCP and DNS.
+    static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 3 }>> = StaticCell::new();
     static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; CONNECTIONS]> =
         ConstStaticCell::new([const { Buffers::new() }; _]);
     static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
@@ -114,7 +134,22 @@ fn start(
         spawner.spawn(worker(tcp, client, house)?);
     }
     spawner.spawn(doorman(tcp)?);
+    static UPDATE_BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; 1]> =
+        ConstStaticCell::new([const { Buffers::new() }; _]);
+    static UPDATE_POOL: StaticCell<Pool<1, BUFFER, BUFFER>> = StaticCell::new();
+    let pool = UPDATE_POOL.init(Pool::new(UPDATE_BUFFERS.take()));
+    spawner.spawn(updates(house, Tcp::new(stack, pool), slots, standing)?);
     Ok(())
+}
+
+#[embassy_executor::task]
+async fn updates(
+    house: &'static House,
+    tcp: Tcp<1, BUFFER, BUFFER>,
+    slots: PartitionedSlots<Flash>,
+    standing: Standing,
+) {
+    update::run(house, tcp, slots, standing).await;
 }
 
 static SERVER: Server = Server::new();
@@ -142,7 +177,7 @@ async fn servo_tick(house: &'static House) {
 }
 
 #[embassy_executor::task]
-async fn storage(house: &'static House, memory: Memory<Flash>) {
+async fn storage(house: &'static House, memory: Memory<FlashPartition>) {
     house.store.run(memory).await;
 }
 

@@ -8,6 +8,8 @@ pub mod embassy_tcp;
 pub mod esp;
 #[cfg(any(feature = "desktop", feature = "virt"))]
 pub mod scripted_radio;
+#[cfg(feature = "slots")]
+pub mod slots;
 #[cfg(feature = "virt")]
 pub mod virt;
 
@@ -23,19 +25,29 @@ mod esp32s3;
 
 /// Where the settings are in a flash of 4 MB; `partitions.csv` is the whole layout.
 pub const SETTINGS: core::ops::Range<u32> = 0x29_0000..0x29_8000;
+/// Where it says which firmware starts.
+pub const BOOT_CHOICE: core::ops::Range<u32> = 0x9000..0xb000;
+/// The two slots for firmware.
+pub const SLOTS: [core::ops::Range<u32>; 2] = [0x1_0000..0x15_0000, 0x15_0000..0x29_0000];
 
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_settings_are_where_the_partition_table_says() {
+    fn everything_is_where_the_partition_table_says() {
         let table = include_str!("../../partitions.csv");
-        let row = table
-            .lines()
-            .find(|line| line.starts_with("settings,"))
-            .unwrap();
-        let fields: Vec<&str> = row.split(',').map(str::trim).collect();
-        let number = |text: &str| u32::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
-        let (start, size) = (number(fields[3]), number(fields[4]));
-        assert_eq!(super::SETTINGS, start..start + size);
+        let [first, second] = super::SLOTS;
+        for (name, place) in [
+            ("settings,", super::SETTINGS),
+            ("otadata,", super::BOOT_CHOICE),
+            ("ota_0,", first),
+            ("ota_1,", second),
+        ] {
+            let row = table.lines().find(|line| line.starts_with(name)).unwrap();
+            let fields: Vec<&str> = row.split(',').map(str::trim).collect();
+            let number =
+                |text: &str| u32::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
+            let (start, size) = (number(fields[3]), number(fields[4]));
+            assert_eq!(place, start..start + size, "{name}");
+        }
     }
 }

@@ -36,6 +36,15 @@ pub struct Status {
     pub refused: Option<Rejection>,
 }
 
+impl Status {
+    /// Nothing is done, and nothing is to be told.
+    pub const NONE: Self = Self {
+        progress: Progress::Idle,
+        standing: Standing::Settled,
+        refused: None,
+    };
+}
+
 /// In words, without a double quote.
 impl fmt::Display for Status {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -87,11 +96,7 @@ mod tests {
     #[test]
     fn in_words() {
         let version = Version::new(0, 2, 0);
-        let idle = Status {
-            progress: Progress::Idle,
-            standing: Standing::Settled,
-            refused: None,
-        };
+        let idle = Status::NONE;
         let loading = Progress::Loading {
             version,
             percent: 43,

@@ -63,9 +63,8 @@ impl Update {
     /// How updates stand.
     pub fn status(&self) -> Status {
         self.status.lock(Cell::get).unwrap_or(Status {
-            progress: Progress::Idle,
-            standing: Standing::Settled,
             refused: Some(Rejection::NoSlots),
+            ..Status::NONE
         })
     }
 
@@ -115,9 +114,8 @@ where
 {
     let update = &house.update;
     let status = Status {
-        progress: Progress::Idle,
         standing,
-        refused: None,
+        ..Status::NONE
     };
     update.status.lock(|told| told.set(Some(status)));
     if let Standing::Trial { .. } = standing {
@@ -161,7 +159,7 @@ where
     let manifest = trust::read(text)?;
     let slot = u32::try_from(slots.other().capacity()).unwrap_or(u32::MAX);
     manifest.check(&Running {
-        board: S::BOARD,
+        board: slots.board(),
         version: Version::FIRMWARE,
         slot,
     })?;
