@@ -1,8 +1,22 @@
 //! One file for a chip's flash: bootloader, partition table and firmware.
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
+use std::fs;
 use std::path::PathBuf;
 use xtask::board::{Board, own_cargo, root, run, target_dir};
+use xtask::slots;
+
+/// Builds the firmware and gives what goes into a slot.
+pub fn slot_image(board: Board, setup: bool) -> Result<Vec<u8>> {
+    if board == Board::Virt {
+        let firmware = board.build(board.binary(), &[], setup)?;
+        return slots::flatten(&firmware);
+    }
+    let mut file = image(board, setup)?.into_os_string();
+    file.push(".app");
+    let file = PathBuf::from(file);
+    fs::read(&file).with_context(|| file.display().to_string())
+}
 
 /// Builds the firmware and makes the file.
 pub fn image(board: Board, setup: bool) -> Result<PathBuf> {

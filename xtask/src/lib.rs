@@ -4,5 +4,7 @@ pub mod bench;
 pub mod board;
 pub mod emulator;
 pub mod records;
+pub mod release;
 pub mod size;
+pub mod slots;
 pub mod toolchain;

@@ -8,21 +8,23 @@ use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Ticker};
 use firmware::board::Vitals;
 use firmware::boards::esp::data::BOARD;
-use firmware::boards::esp::flash::FlashPartition;
+use firmware::boards::esp::flash::{Chip, FlashPartition};
 use firmware::boards::esp::light::Light;
-use firmware::boards::esp::net::{Connections, Net, NetRunner};
+use firmware::boards::esp::net::{Connections, Net, NetRunner, UpdateConnection};
 use firmware::boards::esp::radio::EspRadio;
 use firmware::boards::esp::servos::{FRAME, ServoPorts};
 use firmware::boards::esp::start::{self, Network, Parts};
 use firmware::boards::esp::system::Watchdog;
 use firmware::boards::esp::{Button, last_panic, pwm_timer, system};
+use firmware::boards::slots::PartitionedSlots;
 use firmware::services::House;
 use firmware::services::line_us::{ANYWHERE, Server};
 use firmware::services::storage::Memory;
-use firmware::services::{network, panel};
+use firmware::services::{network, panel, update};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 use protocol_core::panel::Lamp;
 use protocol_core::settings::Settings;
+use protocol_core::update::Standing;
 use static_cell::StaticCell;
 
 esp_bootloader_esp_idf::esp_app_desc!();
@@ -75,6 +77,12 @@ fn spawn(
         return Ok(());
     };
     let tcp = net.connections();
+    match parts.slots {
+        Some((slots, standing)) => {
+            spawner.spawn(updates(house, net.update_connection(), slots, standing)?);
+        }
+        None => defmt::error!("no two slots for firmware: there are no updates"),
+    }
     spawner.spawn(network_stack(runner)?);
     spawner.spawn(wifi(house, radio, net)?);
     for client in (0..).map_while(Client::new) {
@@ -98,6 +106,16 @@ async fn doorman(tcp: Connections) {
     if let Ok(acceptor) = tcp.bind(ANYWHERE).await {
         SERVER.turn_away(&acceptor).await;
     }
+}
+
+#[embassy_executor::task]
+async fn updates(
+    house: &'static House,
+    tcp: UpdateConnection,
+    slots: PartitionedSlots<Chip>,
+    standing: Standing,
+) {
+    update::run(house, tcp, slots, standing).await;
 }
 
 /// The servo tick. Runs above everything else, on the stack of whatever it interrupts.

@@ -12,12 +12,14 @@ use static_cell::StaticCell;
 
 /// Line-us connections: the clients, and the one that is told that there are too many.
 pub const CONNECTIONS: usize = MAX_CLIENTS + 1;
-/// Sockets: the connections, the DHCP client, the DHCP server.
-const SOCKETS: usize = CONNECTIONS + 2;
+/// Sockets: the connections, the one for updates, the DHCP client, the DHCP server, the DNS client.
+const SOCKETS: usize = CONNECTIONS + 4;
 /// Buffer of a connection in bytes, in each direction: a segment of Ethernet.
 const BUFFER: usize = 1536;
 /// The connections.
 pub type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
+/// The connection for updates.
+pub type UpdateConnection = Tcp<1, BUFFER, BUFFER>;
 /// DHCP requests that may wait to be read.
 const REQUESTS: usize = 4;
 
@@ -60,6 +62,18 @@ impl Net {
         static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
 
         let buffers = BUFFERS.init_with(|| [const { Buffers::new() }; CONNECTIONS]);
+        Tcp::new(self.stack, POOL.init(Pool::new(buffers)))
+    }
+
+    /// The connection for updates.
+    ///
+    /// # Panics
+    /// When it is called twice.
+    pub fn update_connection(&self) -> UpdateConnection {
+        static BUFFERS: StaticCell<[Buffers<BUFFER, BUFFER>; 1]> = StaticCell::new();
+        static POOL: StaticCell<Pool<1, BUFFER, BUFFER>> = StaticCell::new();
+
+        let buffers = BUFFERS.init_with(|| [const { Buffers::new() }]);
         Tcp::new(self.stack, POOL.init(Pool::new(buffers)))
     }
 }
