@@ -238,7 +238,7 @@ impl Reply {
             "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
              WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
-             Memory:\"{}\" Update:\"{}\" UpdateKey:{}{}",
+             Memory:\"{}\" UpdateKey:{} Update:\"{}\"{}",
             state.name.as_str(),
             state.identity.serial(),
             Uptime(state.uptime),
@@ -251,8 +251,8 @@ impl Reply {
             state.free_memory,
             state.reset_reason,
             state.memory,
-            state.update,
             state.update_key,
+            state.update,
             LastPanic(state.last_panic),
         ));
     }
@@ -634,7 +634,7 @@ mod tests {
             });
         });
         assert!(
-            text.contains("UpdateKey:ffffffff LastPanic:\"panicked at 'somewhere'?")
+            text.contains("one 4294967295\" LastPanic:\"panicked at 'somewhere'?")
                 && text.ends_with("...\""),
             "{text}"
         );

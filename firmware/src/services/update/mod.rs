@@ -62,10 +62,7 @@ impl Update {
 
     /// How updates stand.
     pub fn status(&self) -> Status {
-        self.status.lock(Cell::get).unwrap_or(Status {
-            refused: Some(Rejection::NoSlots),
-            ..Status::NONE
-        })
+        self.status.lock(Cell::get).unwrap_or(Status::NONE)
     }
 
     /// Updates, and gives the version that starts in a moment. Whoever stops waiting does not stop the
