@@ -2,7 +2,7 @@
 
 use crate::machine::{Machine, OLD, SLOT, WORLD, choice, flash, slot};
 use crate::release::{IMAGE, MANIFEST, Release, address};
-use crate::server::{Answer, HOST, PORT};
+use crate::server::{Answer, HOST, PORT, Server};
 use embassy_time::{Duration, Instant};
 use protocol_core::update::{Rejection, Slot, Standing, Version};
 
@@ -25,6 +25,17 @@ fn a_good_update_is_written_and_starts_on_trial() {
         let machine = Machine::start(&flash, &server, &address(), WORLD).unwrap();
         assert_eq!(machine.standing, Standing::Trial { starts: 1 });
     }
+}
+
+#[test]
+fn a_manifest_that_was_made_elsewhere_is_good() {
+    // By Python's `hashlib` and `cryptography`, with the development key.
+    let server = Server::default();
+    server.put(MANIFEST, Answer::file(include_bytes!("elsewhere.txt")));
+    server.put(IMAGE, Answer::file(b"made without this project's code\n"));
+    let flash = flash();
+    let mut machine = Machine::start(&flash, &server, &address(), WORLD).unwrap();
+    assert_eq!(machine.update(), Ok(NEW));
 }
 
 #[test]

@@ -163,6 +163,30 @@ fn an_update_after_one_that_was_taken_back_is_tried_again() {
     }
 }
 
+/// The erase of a page may reach the state before the number and its CRC.
+#[test]
+fn an_entry_that_was_taken_back_does_not_count_while_its_page_is_erased() {
+    let mut flash = Flash::flashed();
+    flash.switch_to(Slot::Second);
+    for _ in 0..4 {
+        flash.start();
+    }
+    assert_eq!(bootloader(&flash), Slot::First);
+    let mut erases = 0;
+    for step in flash.choice().switch_to(Slot::Second, NEW) {
+        if let Step::Erase { page } = step {
+            erases += 1;
+            let mut torn = flash.clone();
+            torn.0[page as usize + 24..][..4].fill(0xff);
+            assert_eq!(bootloader(&torn), Slot::First);
+            torn.0[page as usize + 4..][..24].fill(0xff);
+            assert_eq!(bootloader(&torn), Slot::First);
+        }
+        flash.perform(&step);
+    }
+    assert_eq!((erases, bootloader(&flash)), (1, Slot::Second));
+}
+
 #[test]
 fn slots_take_turns() {
     let mut flash = Flash::flashed();
