@@ -5,6 +5,7 @@
 
 use embedded_storage_async::nor_flash::{MultiwriteNorFlash, NorFlash};
 use heapless::Vec;
+use protocol_core::lasaur::Sensors;
 use protocol_core::machine::SetPoint;
 use protocol_core::motion::Micros;
 pub use protocol_core::panel::Colour;
@@ -121,6 +122,34 @@ pub trait FirmwareSlots {
 
     /// Starts the firmware of the slot that is chosen now.
     async fn restart(&mut self) -> !;
+}
+
+/// What a plotter's controller senses: door, chiller, power, limit switches. An input that a board does
+/// not have is never set.
+#[expect(
+    async_fn_in_trait,
+    reason = "awaited in place by the serial service alone, so no bound is missing"
+)]
+pub trait Inputs {
+    /// The inputs now; must not wait.
+    fn sense(&self) -> Sensors;
+
+    /// Waits until one of them has changed. May be dropped and called again at any time.
+    async fn changed(&mut self);
+}
+
+/// A board without inputs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoInputs;
+
+impl Inputs for NoInputs {
+    fn sense(&self) -> Sensors {
+        Sensors::default()
+    }
+
+    async fn changed(&mut self) {
+        core::future::pending::<()>().await;
+    }
 }
 
 /// What a board knows about itself, for diagnostics.

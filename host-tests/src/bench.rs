@@ -1,7 +1,8 @@
 //! The core's sessions and machine wired as the firmware's services wire them, without sockets, tasks
 //! and real time: a line in, a reply out, and every set-point on record.
 
-use protocol_core::arm::Calibration;
+use protocol_core::arm::{Calibration, Compensation, Directions};
+use protocol_core::drawings::{ButtonDraws, Contents, Space};
 use protocol_core::lineus::{Diagnostics, Identity, Reply, Request, Session};
 use protocol_core::machine::{ArmData, Client, Errand, MAX_CLIENTS, Machine, Report, SetPoint};
 use protocol_core::motion::{Micros, Steps};
@@ -175,10 +176,13 @@ impl Bench {
             Request::Capabilities => reply.capabilities(&self.name, false),
             Request::Diagnostics => reply.diagnostics(&Diagnostics {
                 name: &self.name,
+                host: None,
                 identity: IDENTITY,
                 uptime: Micros::new(self.next_us),
                 position: self.machine.position(),
                 calibration: self.machine.calibration(),
+                compensation: self.machine.compensation(),
+                directions: self.machine.directions(),
                 wifi: &Status {
                     setup: false,
                     phase: Phase::Searching,
@@ -190,6 +194,7 @@ impl Bench {
                 memory: "none",
                 update: &update::Status::NONE,
                 update_key: update::KeyName::Development,
+                space: Space::default(),
                 last_panic: "",
             }),
             Request::Name => reply.name(&self.name),
@@ -201,13 +206,62 @@ impl Bench {
             Request::Start => reply.start(&Settings::default()),
             Request::Waves => reply.waves(true),
             Request::Networks => reply.networks(&[], &Networks::new()),
-            Request::SetStart { .. }
+            Request::OwnNetwork => reply.own_network(&Settings::default()),
+            // Nor are drawings that are kept.
+            Request::Drawings => reply.drawings(&Contents::EMPTY),
+            Request::Space => reply.space(Space::default()),
+            Request::Button => reply.button(ButtonDraws::default()),
+            Request::Replaying => reply.replay(None),
+            Request::SetButton(_)
+            | Request::Draw(_)
+            | Request::StopDrawing
+            | Request::BeginRecording(_)
+            | Request::RecordLine
+            | Request::EndRecording
+            | Request::Delete(_)
+            | Request::SetReplay(_)
+            | Request::SetStart { .. }
+            | Request::ProtectOwnNetwork(_)
             | Request::SetWaves(_)
             | Request::Remember { .. }
             | Request::Forget(_)
             | Request::ForgetAll
             | Request::SetUpdateAddress(_) => reply.ok(),
             Request::Update => reply.error(format_args!("{}", update::Rejection::NoSlots)),
+            Request::Compensation => {
+                let now = self.machine.compensation();
+                reply.compensation(now.map(), now.shift());
+            }
+            Request::SetCompensation { map, shift } => {
+                self.at_rest(client, |bench| {
+                    let now = bench.machine.compensation();
+                    let map = map.unwrap_or(now.map());
+                    let shift = shift.unwrap_or(now.shift());
+                    let new = Compensation::new(map, shift);
+                    bench.machine.set_compensation(new);
+                });
+                reply.ok();
+            }
+            Request::Directions => reply.directions(self.machine.directions()),
+            Request::SetDirections(servos) => {
+                self.at_rest(client, |bench| {
+                    let mut new = bench.machine.directions();
+                    for (new, wanted) in new.reversed.iter_mut().zip(servos) {
+                        *new = wanted.unwrap_or(*new);
+                    }
+                    bench.machine.set_directions(new);
+                });
+                reply.ok();
+            }
+            Request::FactoryReset => {
+                self.at_rest(client, |bench| {
+                    bench.name = MachineName::default();
+                    bench.machine.set_calibration(Calibration::default());
+                    bench.machine.set_compensation(Compensation::default());
+                    bench.machine.set_directions(Directions::default());
+                });
+                reply.ok();
+            }
             Request::Calibrate => {
                 self.at_rest(client, |bench| {
                     let here = bench.machine.calibration_here();

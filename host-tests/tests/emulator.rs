@@ -1,16 +1,20 @@
 //! The firmware on the chip's instruction set, in QEMU, with everything around it real: sockets, a disk
 //! that survives, and servos of which every pulse is read back.
 
-use host_tests::desktop::{Client, draw};
+use host_tests::desktop::serial::SerialPort;
+use host_tests::desktop::{Client, Web, draw, wait_until};
+use host_tests::lasaur::host::LasaurApp;
+use protocol_core::lasaur::BANNER;
 use protocol_core::motion::PEN_UP;
 use std::collections::BTreeSet;
 use std::fs;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
-use xtask::emulator::{Emulator, Options, Time, free_address};
+use xtask::emulator::{Emulator, FLASH_SIZE, Options, Time, free_address};
+use xtask::ready::{Owner, put_into};
 use xtask::records::{Frame, Record};
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -20,6 +24,7 @@ const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
 struct Machine {
     emulator: Emulator,
     address: SocketAddr,
+    web: Web,
     folder: TempDir,
     time: Time,
 }
@@ -30,21 +35,30 @@ impl Machine {
     }
 
     fn boot_in(folder: TempDir, time: Time) -> Self {
+        Self::boot_with(folder, time, None)
+    }
+
+    /// A machine with something at the other end of its serial line.
+    fn boot_with(folder: TempDir, time: Time, serial: Option<String>) -> Self {
         let firmware = std::env::var_os("QUILL_VIRT_FIRMWARE")
             .map(PathBuf::from)
             .expect(
                 "QUILL_VIRT_FIRMWARE names the firmware: run these tests with `cargo xtask test`",
             );
+        let web = free_address().unwrap();
         let options = Options {
             line_us: free_address().unwrap(),
+            web: Some(web),
             flash: folder.path().join("flash"),
             time,
+            serial,
         };
         let mut emulator = Emulator::boot(&firmware, &options).unwrap();
         emulator.wait_ready().unwrap();
         Self {
             emulator,
             address: options.line_us,
+            web: Web::at(web),
             folder,
             time,
         }
@@ -295,6 +309,35 @@ fn settings_survive_a_power_cycle() {
     assert_eq!(calibration_of(&mut client), calibration);
 }
 
+#[test]
+fn a_ready_made_arm_joins_its_network_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let password = folder.path().join("password");
+    fs::write(&password, "correct horse\n").unwrap();
+    let owner = Owner {
+        network: Some("quill-test".into()),
+        password_file: Some(password),
+        name: Some("robs-lineus".into()),
+    };
+    let settings = owner.settings().unwrap().unwrap();
+    let table = include_str!("../../firmware/partitions.csv");
+    let mut flash = vec![0xff; FLASH_SIZE as usize];
+    put_into(&mut flash, &settings, table).unwrap();
+    fs::write(folder.path().join("flash"), flash).unwrap();
+
+    let mut machine = Machine::boot_in(folder, Time::Wall);
+    machine.wait_for_light([0, 0, 64]);
+    let said = machine.emulator.said();
+    assert!(
+        said.iter().any(|line| line.contains("network joined")),
+        "{said:?}"
+    );
+    let mut client = machine.client();
+    assert_eq!(client.say("M550"), "ok MACHINENAME:robs-lineus");
+    let diagnostics = client.say("M122");
+    assert!(diagnostics.contains(" Memory:\"ok\""), "{diagnostics}");
+}
+
 fn calibration_of(client: &mut Client) -> String {
     let reply = client.say("M122");
     let found = reply
@@ -335,6 +378,53 @@ fn the_button_and_m587_change_the_network_and_the_light_shows_it() {
     );
 }
 
+#[test]
+fn a_drawing_from_memory_moves_the_servos_exactly_as_on_the_desktop() {
+    let file = Path::new(EXAMPLES).join("hello.gcode");
+    let text = fs::read_to_string(&file).unwrap();
+    let machine = Machine::boot(Time::Virtual);
+    let mut client = machine.client();
+    // What follows is to be the drawing alone.
+    assert_eq!(client.say("M291 S2"), "ok ");
+    assert_eq!(client.say("M28 S7"), "ok ");
+    for line in text.lines() {
+        assert_eq!(client.say(line), "ok ", "{line}");
+    }
+    assert_eq!(client.say("M29"), "ok ");
+    let length = "G54 X0 Y0 S1\n".len() + text.len();
+    let list = format!("ok FS:\"/0000007.txt-{length};\"");
+    assert_eq!(client.say("M20"), list);
+
+    let mut machine = machine.power_cycle();
+    let mut client = machine.client();
+    assert_eq!(client.say("M20"), list);
+    assert_eq!(client.say("M23 K7"), "ok ");
+    // It needs nobody.
+    drop(client);
+    machine
+        .emulator
+        .wait_for_line("drawing 7 has ended", PATIENCE)
+        .unwrap();
+    let expected = desktop_motion(&file);
+    let (mut seen, mut late) = (Vec::new(), 0);
+    for _ in 0..100 {
+        for frame in machine.frames() {
+            seen.push(frame.set_point.pulses.map(|pulse| pulse.get()));
+            late = late.max(frame.late);
+        }
+        if motion(seen.iter().copied()).len() >= expected.len() {
+            break;
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+    let moved = motion(seen);
+    let differs = moved.iter().zip(&expected).position(|(a, b)| a != b);
+    assert_eq!(differs, None, "the first pulses that differ");
+    assert_eq!(moved.len(), expected.len());
+    // Reading flash delays no frame.
+    assert!(late <= 2, "{late} us late");
+}
+
 impl Machine {
     fn wait_for_light(&mut self, wanted: [u8; 3]) {
         for _ in 0..400 {
@@ -347,6 +437,42 @@ impl Machine {
         }
         panic!("the light never shows {wanted:?}");
     }
+}
+
+#[test]
+fn the_machine_is_found_by_its_name_and_follows_it() {
+    let machine = Machine::boot(Time::Wall);
+    wait_until("line-us.local to be found", || {
+        address_of(&machine, b"\x07line-us\x05local\0") == Some([10, 0, 2, 15])
+    });
+    let mut client = machine.client();
+    let renamed = client.say("M550 Probs-lineus");
+    assert_eq!(renamed, "ok MACHINENAME:robs-lineus");
+    wait_until("robs-lineus.local to be found", || {
+        address_of(&machine, b"\x0brobs-lineus\x05local\0") == Some([10, 0, 2, 15])
+    });
+    assert!(client.say("M122").contains(" Host:robs-lineus.local "));
+    assert_eq!(address_of(&machine, b"\x07line-us\x05local\0"), None);
+}
+
+/// Asks once for the address behind a name, as a program does that knows nothing of multicast (RFC 6762,
+/// section 6.7).
+fn address_of(machine: &Machine, name: &[u8]) -> Option<[u8; 4]> {
+    let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+    socket.connect(machine.address).unwrap();
+    let patience = Duration::from_millis(500);
+    socket.set_read_timeout(Some(patience)).unwrap();
+    let header = [0xab, 0xcd, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0];
+    let question = [&header, name, &[0, 1, 0, 1]].concat();
+    socket.send(&question).unwrap();
+    let mut answer = [0; 1500];
+    let length = socket.recv(&mut answer).ok()?;
+    // Type, class, ten seconds, four bytes; then the address.
+    let record = [name, &[0, 1, 0, 1, 0, 0, 0, 10, 0, 4]].concat();
+    let at = answer[..length]
+        .windows(record.len())
+        .position(|bytes| bytes == record)?;
+    answer[at + record.len()..].first_chunk().copied()
 }
 
 #[test]
@@ -394,4 +520,192 @@ fn no_frame_is_late_or_missing_while_two_clients_flood() {
         "{} frames, {moving} in motion, none missing, none late",
         frames.len()
     );
+}
+
+/// A machine, and the other end of its serial line since before it was switched on.
+fn boot_with_serial() -> (Machine, SerialPort) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("tcp:{},nodelay=on", listener.local_addr().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let machine = Machine::boot_with(folder, Time::Wall, Some(line));
+    let mut port = SerialPort::over_tcp(listener.accept().unwrap().0);
+    assert_eq!(port.line(), BANNER.trim_end());
+    (machine, port)
+}
+
+fn queue(host: &mut LasaurApp, port: &mut SerialPort, lines: &[&str]) -> Vec<String> {
+    host.lines.clear();
+    lines.iter().for_each(|line| host.queue(line));
+    port.serve(host);
+    host.lines.clone()
+}
+
+#[test]
+fn laser_software_runs_a_job_over_the_serial_line() {
+    let (mut machine, mut port) = boot_with_serial();
+    let mut host = LasaurApp::default();
+    assert_eq!(queue(&mut host, &mut port, &["!"]), ["!R"; 2]);
+    assert_eq!(queue(&mut host, &mut port, &["~", "G30"]), [""; 4]);
+    machine.frames();
+    let job = [
+        "G90",
+        "M80",
+        "G0F8000",
+        "G1F3000",
+        "S255",
+        "G00X10.000Y10.000",
+        "G01X30.000Y10.000",
+        "G01X30.000Y25.000",
+        "G01X10.000Y25.000",
+        "G01X10.000Y10.000",
+        "M81",
+        "S0",
+        "G0X0Y0F8000",
+    ];
+    assert_eq!(queue(&mut host, &mut port, &job), [""; 26]);
+    port.wait_for_place("X5.000Y5.000V");
+    // The last frame may not have been read.
+    let mut frames = Vec::new();
+    let home = (710 + 100, -900 + 100);
+    while frames.last().is_none_or(|frame: &Frame| {
+        let there = frame.set_point.position;
+        (there.x.rounded(), there.y.rounded()) != home || there.z != PEN_UP
+    }) || frames.len() < 100
+    {
+        frames.extend(machine.frames());
+        thread::sleep(Duration::from_millis(20));
+    }
+    // Corners of the square, in drawing units, the offset included: the pen is down at each.
+    let corners = [(1010, -600), (1410, -600), (1410, -300), (1010, -300)];
+    for corner in corners {
+        let drawn = frames.iter().any(|frame| {
+            let there = frame.set_point.position;
+            let aside = f64::hypot(
+                there.x.to_f64() - f64::from(corner.0),
+                there.y.to_f64() - f64::from(corner.1),
+            );
+            // A frame at 50 mm/s is 10 units.
+            there.pen_is_down() && aside < 10.0
+        });
+        assert!(drawn, "{corner:?} was not drawn");
+    }
+    let air: Vec<bool> = frames
+        .iter()
+        .map(|frame| frame.set_point.outputs[0])
+        .collect();
+    let on = air.iter().position(|on| *on).unwrap();
+    let off = air.iter().rposition(|on| *on).unwrap();
+    assert!(air[on..off].iter().all(|on| *on) && !air[air.len() - 1]);
+    let drawing = |frame: &Frame| frame.set_point.position.pen_is_down();
+    assert!(on <= frames.iter().position(drawing).unwrap());
+    // Off at the end of the last stroke, where the pen then rises.
+    let end = frames[off].set_point.position;
+    let (x, y) = (f64::from(corners[0].0), f64::from(corners[0].1));
+    let aside = f64::hypot(end.x.to_f64() - x, end.y.to_f64() - y);
+    assert!(aside < 5.0, "{end:?}");
+}
+
+#[test]
+fn door_chiller_and_power_are_told_over_the_serial_line() {
+    let (mut machine, mut port) = boot_with_serial();
+    let mut told = |line: &str, reply: &str| {
+        machine.emulator.say(line).unwrap();
+        for _ in 0..500 {
+            if port.say("G90") == reply {
+                return;
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+        panic!("{line:?} is not answered {reply:?}");
+    };
+    told("door open", "D");
+    told("chiller off", "DC");
+    told("door closed", "C");
+    told("power off", "!PCP");
+    told("chiller on", "!PP");
+    told("power on", "!P");
+    port.send("~");
+    assert_eq!(port.say("G90"), "");
+}
+
+#[test]
+fn a_stop_over_the_serial_line_reaches_an_arm_that_others_move() {
+    let (machine, mut port) = boot_with_serial();
+    let mut client = machine.client();
+    assert!(client.say("G94 S1").starts_with("ok"));
+    assert!(client.say("G01 X1900 Y0 Z0").starts_with("ok "));
+    port.send("!");
+    assert_eq!(port.say("?"), "!R");
+    assert!(
+        client
+            .say("G28")
+            .starts_with("error INFO:\"the machine is stopped")
+    );
+    port.send("~");
+    assert_eq!(port.say("G90"), "");
+    assert!(client.say("G28").starts_with("ok "));
+}
+
+#[test]
+fn a_browser_finds_the_page_and_the_machine_draws_what_it_sends() {
+    let mut machine = Machine::boot(Time::Wall);
+    let web = machine.web;
+    let page = web.get("/");
+    assert_eq!(
+        (page.status, page.header("content-encoding")),
+        (200, Some("gzip"))
+    );
+    assert_eq!(
+        page.body.len().to_string(),
+        page.header("content-length").unwrap()
+    );
+    let mut socket = web.web_socket("/");
+    assert!(socket.message().starts_with("hello VERSION:"));
+    let text = "G01 X1200 Y0\nG01 Z0\nG01 X1300\nG01 Z1000\n";
+    let job = web.done("/api/job", text);
+    assert_eq!(job["lines"]["total"], 4);
+    wait_until("the end of the drawing", || web.job_state() == "done");
+    assert_eq!(socket.say("M114"), "ok X:1300 Y:0 Z:1000");
+    assert_eq!(web.get("/api/job/drawing").body, text.as_bytes());
+    let down = machine
+        .frames()
+        .into_iter()
+        .filter(|frame| frame.set_point.position.pen_is_down());
+    assert!(down.count() > 20);
+}
+
+#[test]
+fn no_frame_is_late_or_missing_in_a_crowd_of_browsers() {
+    let mut machine = Machine::boot(Time::Virtual);
+    let web = machine.web;
+    let text =
+        "G01 X1200 Y0\nG01 Z0\nG01 X1500\nG01 Y300\nG01 X1200\nG01 Y0\nG01 Z1000\n".repeat(150);
+    let job = web.post("/api/job", &text);
+    // An answer may be lost, where time jumps while it is on its way; the drawing is not.
+    assert!(matches!(job.status, 200 | 409), "{job:?}");
+    for _ in 0..3 {
+        web.crowd(50);
+    }
+    wait_until("the end of the drawing", || web.job_state() == "done");
+    assert_eq!(web.state()["job"]["lines"]["done"], text.lines().count());
+    let frames = machine.frames();
+    let moving = frames.iter().filter(|frame| frame.set_point.moving).count();
+    assert!(moving > 50_000, "{moving} frames in motion");
+    let worst = frames.iter().max_by_key(|frame| frame.late).unwrap();
+    // As above.
+    assert!(worst.late <= 2, "{} us late: {worst:?}", worst.late);
+}
+
+#[test]
+fn a_press_of_the_button_ends_a_stop() {
+    let (mut machine, mut port) = boot_with_serial();
+    port.send("!");
+    assert_eq!(port.say("?"), "!R");
+    // Presses within the first two seconds are for a factory reset.
+    thread::sleep(Duration::from_secs(2));
+    machine.emulator.say("button down").unwrap();
+    thread::sleep(Duration::from_millis(200));
+    machine.emulator.say("button up").unwrap();
+    wait_until("the end of the stop", || port.say("G90").is_empty());
+    assert!(machine.client().say("G28").starts_with("ok "));
 }

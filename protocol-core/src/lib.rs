@@ -13,6 +13,8 @@
 #![forbid(unsafe_code)]
 
 pub mod arm;
+pub mod drawings;
+pub mod lasaur;
 pub mod lineus;
 pub mod machine;
 pub mod motion;

@@ -5,213 +5,68 @@
 //! completed; from rest at once (`reference/line-us.md`, section 4). Where a client leaves out a
 //! coordinate, it is the one the arm has when the move begins.
 //!
+//! # Who may move
+//!
+//! Everybody takes turns, in the order they came; that is decided in [`Machine::advance`] alone. A turn
+//! is one errand of a [`Client`], or a whole plan of the serial port ([`Machine::plan`]): the plan comes
+//! when its first segment is added, and once its turn has come it keeps the arm until it has run
+//! dry, its host has sent nothing more for [`STREAM_GAP`](crate::motion::STREAM_GAP), and the pen is
+//! up. Errands wait meanwhile and are answered when they begin; a plan waits for the errands
+//! that came before it. [`Errand::Rest`] begins when nothing moves and holds up errands and plan alike.
+//!
+//! A stopped machine ([`Machine::stop`]) moves for nobody: moves are refused, those that wait as well.
+//!
 //! Everything here takes a bounded number of instructions, so that it can run between two frames of
 //! the servos.
 
-use crate::arm::{Angles, Calibration, HOME_ANGLES, PenLift, Pulses, ServoRange, forward, inverse};
+mod data;
+mod errand;
+mod fitting;
+mod motion;
+mod plotter;
+
+pub use data::{ArmData, SetPoint, nib_of, position_of};
+pub use errand::{
+    Bare, Client, Errand, Limited, MAX_ASKERS, MAX_CLIENTS, MAX_WEB_CLIENTS, Manner, Report, Target,
+};
+pub use plotter::{NotPlanned, StopReason};
+
+use crate::arm::{Calibration, Compensation, Directions, Pulses};
 use crate::motion::{
-    Coordinate, DEFAULT_STEPS, HOME, Line, Microdegrees, Micros, PEN_DOWN, PEN_UP, Position, Rapid,
-    Steps, Wave, WideCoordinate, closest, hold,
+    DEFAULT_STEPS, HOME, Line, MOST_DWELL, Micros, PEN_UP, PlanEvent, Planner, Position, Rapid,
+    Side, Steps, Wave, closest, hold,
 };
 use heapless::Deque;
+use motion::{Active, Motion};
 
-/// Clients that may be connected at once; the next one is told so and closed.
-pub const MAX_CLIENTS: usize = 4;
-
-/// Everybody who may ask something of the arm: network clients, the serial port, the firmware itself.
-pub const MAX_ASKERS: usize = MAX_CLIENTS + 2;
-
-/// One of those who may ask something of the arm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Client(u8);
-
-impl Client {
-    /// The serial port.
-    pub const SERIAL: Self = Self(MAX_CLIENTS as u8);
-    /// The firmware itself: waves, and settings that nobody on a connection asked to store.
-    pub const HOUSE: Self = Self(MAX_CLIENTS as u8 + 1);
-
-    /// The network client in a slot, `None` beyond [`MAX_CLIENTS`].
-    pub const fn new(slot: u8) -> Option<Self> {
-        if (slot as usize) < MAX_CLIENTS {
-            Some(Self(slot))
-        } else {
-            None
-        }
-    }
-
-    /// Its slot, below [`MAX_ASKERS`].
-    pub const fn slot(self) -> usize {
-        self.0 as usize
-    }
-}
-
-/// What a board says about its arm.
+/// Waits for the arm.
 #[derive(Clone, Copy, Debug)]
-pub struct ArmData {
-    /// Pulse ranges of shoulder, elbow and pen.
-    pub servos: [ServoRange; 3],
-    /// How the pen servo follows Z.
-    pub lift: PenLift,
-    /// Full speed of every servo for G00, in degrees a second.
-    pub full_speed: u16,
-    /// How long the pen stays down after the connection that lowered it has ended.
-    pub lift_after: Micros,
+enum Turn {
+    Errand(Client, Errand),
+    Plan,
 }
 
-impl Default for ArmData {
-    /// 500..2500 us over 180 degrees, 600 degrees a second, 5 s (`reference/arm.md`).
-    fn default() -> Self {
-        Self {
-            servos: [ServoRange::default(); 3],
-            lift: PenLift::default(),
-            full_speed: 600,
-            lift_after: Micros::from_secs(5),
-        }
+impl Turn {
+    fn is_errand_of(&self, client: Client) -> bool {
+        matches!(self, Self::Errand(other, _) if *other == client)
     }
 }
 
-/// What the servos are told in one frame, and why.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SetPoint {
-    /// Where the nib is to be.
-    pub position: Position,
-    /// The pulses that put it there.
-    pub pulses: Pulses,
-    /// The position is not what was asked for: it is held at the edge of the drawing area.
-    pub held: bool,
-    /// A move is under way, or this is where it ended.
-    pub moving: bool,
-}
-
-/// Where to go; a coordinate left out stays as it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Target {
-    /// In arm coordinates.
-    pub x: Option<WideCoordinate>,
-    /// In arm coordinates.
-    pub y: Option<WideCoordinate>,
-    /// Limited to 0..=1000.
-    pub z: Option<WideCoordinate>,
-}
-
-impl Target {
-    /// Home (`spec 1.0.4a, G28`).
-    pub const HOME: Self = Self::at(HOME);
-
-    /// A place inside the arm's reach.
-    pub const fn at(position: Position) -> Self {
-        Self {
-            x: Some(WideCoordinate::from_bits(position.x.bits() as i64)),
-            y: Some(WideCoordinate::from_bits(position.y.bits() as i64)),
-            z: Some(WideCoordinate::from_bits(position.z.bits() as i64)),
-        }
-    }
-}
-
-/// How to go there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Manner {
-    /// In a straight line (G01).
-    Straight,
-    /// Every servo at its own full speed (G00).
-    Rapid,
-}
-
-/// What a client asks of the arm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Errand {
-    /// Go somewhere.
-    Move(Manner, Target),
-    /// Make a little wave and be back: nothing happens while the pen is down.
-    Wave,
-    /// Come to rest and stay there until [`Machine::release`]: for what must not be done in motion.
-    Rest,
-}
-
-/// In what way a move differs from what was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Limited {
-    /// The target is out of reach: the arm goes to the closest point.
-    Target {
-        /// The pen was to be down and is lifted instead.
-        lifted: bool,
-    },
-    /// The way there leaves the drawing area: it is held at the edge.
-    Way,
-}
-
-/// How an errand turned out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Report {
-    /// The move has begun.
-    Moving {
-        /// Where it ends, in arm coordinates.
-        end: Position,
-        /// What is different from what was asked for.
-        limited: Option<Limited>,
-    },
-    /// The arm is at rest and waits for [`Machine::release`].
-    Resting,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Motion {
-    Line(Line),
-    Rapid(Rapid),
-    Wave(Wave),
-}
-
-impl Motion {
-    const fn duration(&self) -> Micros {
-        match self {
-            Self::Line(line) => line.duration(),
-            Self::Rapid(rapid) => rapid.duration(),
-            Self::Wave(_) => Wave::DURATION,
-        }
-    }
-
-    const fn end(&self) -> Position {
-        match self {
-            Self::Line(line) => line.end(),
-            Self::Rapid(rapid) => rapid.end(),
-            Self::Wave(wave) => wave.end(),
-        }
-    }
-
-    const fn leaves_the_area(&self) -> bool {
-        match self {
-            Self::Line(line) => line.leaves_the_area(),
-            Self::Rapid(rapid) => rapid.leaves_the_area(),
-            // Held at the edge where it would.
-            Self::Wave(_) => false,
-        }
-    }
-
-    #[inline]
-    fn at(&self, elapsed: u32) -> (Position, bool) {
-        match self {
-            Self::Line(line) => line.at(elapsed),
-            Self::Rapid(rapid) => rapid.at(elapsed),
-            Self::Wave(wave) => wave.at(elapsed),
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Active {
-    motion: Motion,
-    begun: Micros,
-    ends: Micros,
-    /// The target was out of reach: its end is marked in the set-points.
-    short: bool,
-}
+/// One errand of each asker, and the plan.
+const MAX_TURNS: usize = MAX_ASKERS + 1;
 
 /// The arm.
+///
+/// In the order written: what every set-point needs lies within the reach of one instruction, and the plan,
+/// which is large, comes last. That saves four instructions in each set-point.
 #[derive(Debug)]
+#[repr(C)]
 pub struct Machine {
     data: ArmData,
     calibration: Calibration,
+    compensation: Compensation,
+    /// Already in the ranges of `data`.
+    directions: Directions,
     steps: Steps,
     /// Where the last move ended, or the one under way began.
     position: Position,
@@ -222,15 +77,19 @@ pub struct Machine {
     /// Until when everything that happened is in the fields above.
     clock: Micros,
     active: Option<Active>,
-    waiting: Deque<(Client, Errand), MAX_ASKERS>,
-    reports: Deque<(Client, Report), MAX_ASKERS>,
     /// Who keeps the arm at rest.
     resting_for: Option<Client>,
     last_mover: Option<Client>,
     lift_at: Option<Micros>,
+    stopped: Option<StopReason>,
+    /// The side of the table that the plan would have left it over, until it is resumed.
+    limit: Option<Side>,
     /// The last frame, and its set-point.
     frame: Micros,
     last: SetPoint,
+    waiting: Deque<Turn, MAX_TURNS>,
+    reports: Deque<(Client, Report), MAX_ASKERS>,
+    plan: Planner,
 }
 
 impl Machine {
@@ -239,23 +98,29 @@ impl Machine {
         let mut machine = Self {
             data,
             calibration,
+            compensation: Compensation::default(),
+            directions: Directions::default(),
             steps: DEFAULT_STEPS,
             position: HOME,
             short: false,
             passed_short: false,
             clock: Micros::default(),
             active: None,
+            plan: Planner::new(&data.plan, data.lift, data.full_speed),
             waiting: Deque::new(),
             reports: Deque::new(),
             resting_for: None,
             last_mover: None,
             lift_at: None,
+            stopped: None,
+            limit: None,
             frame: Micros::default(),
             last: SetPoint {
                 position: HOME,
                 pulses: Pulses::default(),
                 held: false,
                 moving: false,
+                outputs: [false; 3],
             },
         };
         machine.last.pulses = machine.pulses(HOME);
@@ -266,15 +131,27 @@ impl Machine {
     /// [`Self::next_report`] later. A client's next errand replaces one of its own that waits.
     #[inline]
     pub fn take(&mut self, client: Client, errand: &Errand) -> Option<Report> {
-        self.waiting.retain(|(other, _)| *other != client);
+        self.waiting.retain(|turn| !turn.is_errand_of(client));
+        if self.stopped.is_some() && *errand != Errand::Rest {
+            return Some(Report::Stopped);
+        }
         // A move to where the arm is has ended when it began.
         self.advance(self.clock);
-        if self.active.is_none() && self.waiting.is_empty() && self.resting_for.is_none() {
+        let free = self.active.is_none() && !self.plan.has_the_arm() && self.resting_for.is_none();
+        if free && self.waiting.is_empty() {
             return Some(self.begin(client, errand));
         }
         // One place for each client, and this client's was made free above.
-        let _ = self.waiting.push_back((client, *errand));
+        let _ = self.waiting.push_back(Turn::Errand(client, *errand));
         None
+    }
+
+    /// Takes back an errand that waits; says whether there was one. What has begun goes on, and its
+    /// report comes.
+    pub fn withdraw(&mut self, client: Client) -> bool {
+        let before = self.waiting.len();
+        self.waiting.retain(|turn| !turn.is_errand_of(client));
+        self.waiting.len() < before
     }
 
     /// The next report of an errand that had to wait.
@@ -292,7 +169,7 @@ impl Machine {
     /// The client's connection has ended: its errands are forgotten, and if it was the last to move
     /// the arm and left the pen down, the pen is lifted after a while.
     pub fn client_gone(&mut self, client: Client) {
-        self.waiting.retain(|(other, _)| *other != client);
+        self.waiting.retain(|turn| !turn.is_errand_of(client));
         self.reports.retain(|(other, _)| *other != client);
         self.release(client);
         if self.last_mover == Some(client) {
@@ -314,16 +191,23 @@ impl Machine {
                     self.active = None;
                 }
                 Some(_) => return,
+                None if self.plan.has_the_arm() => match self.plan.advance(now) {
+                    Some(event) => self.plan_came_to(event),
+                    None => return,
+                },
                 None => {
                     if self.resting_for.is_some() {
                         return;
                     }
-                    let Some((client, errand)) = self.waiting.pop_front() else {
-                        return;
-                    };
-                    let report = self.begin(client, &errand);
-                    // A client has one errand at a time, so one report at a time as well.
-                    let _ = self.reports.push_back((client, report));
+                    match self.waiting.pop_front() {
+                        None => return,
+                        Some(Turn::Plan) => self.begin_plan(),
+                        Some(Turn::Errand(client, errand)) => {
+                            let report = self.begin(client, &errand);
+                            // A client has one errand at a time, so one report at a time as well.
+                            let _ = self.reports.push_back((client, report));
+                        }
+                    }
                 }
             }
         }
@@ -332,12 +216,20 @@ impl Machine {
     /// The set-point of the servo frame at `now`; the time never goes back.
     #[inline]
     pub fn tick(&mut self, now: Micros) -> SetPoint {
-        let was_moving = self.active.is_some();
-        self.advance(now);
-        if self.active.is_none() {
-            self.lift_abandoned_pen(now);
+        let was_moving = self.is_moving();
+        if self.active.is_some() || !self.plan.lasts_beyond(now) {
+            self.advance(now);
         }
         let (position, held) = match &self.active {
+            Some(Active {
+                motion: Motion::Dwell(position, _),
+                ..
+            }) => {
+                let position = *position;
+                // The end of a dwell need not be waited for: nobody draws in it.
+                self.lift_abandoned_pen(now);
+                (position, false)
+            }
             Some(active) => {
                 // A move takes less than 2^32 us.
                 let elapsed = (now - active.begun).get() as u32;
@@ -345,9 +237,11 @@ impl Machine {
                 let (position, outside) = hold(position);
                 (position, held || outside)
             }
+            None if self.plan.has_the_arm() => hold(self.plan.at(now)),
             None => {
                 self.clock = now;
-                (self.position, self.short)
+                self.lift_abandoned_pen(now);
+                (self.position, self.short && self.active.is_none())
             }
         };
         self.frame = now;
@@ -357,41 +251,47 @@ impl Machine {
             pulses,
             held: held || self.passed_short,
             // A move that ended between two frames shows by the pulses alone.
-            moving: was_moving || self.active.is_some() || pulses != self.last.pulses,
+            moving: was_moving || self.is_moving() || pulses != self.last.pulses,
+            outputs: self.plan.outputs(),
         };
         self.passed_short = false;
         self.last
     }
 
-    /// When the move under way completes: something may begin then.
+    /// When the move under way completes: something may begin then. Of a plan it is the last motion
+    /// that counts, because what comes before it happens in frames alone.
     pub fn next_event(&self) -> Option<Micros> {
-        self.active.as_ref().map(|active| active.ends)
+        match &self.active {
+            Some(active) => Some(active.ends),
+            None => self.plan.ends(),
+        }
     }
 
-    /// Whether a move is under way or waits, or the servos have not been told its end.
+    /// Whether a move or a plan is under way or waits, or the servos have not been told its end.
     pub fn is_busy(&self) -> bool {
-        self.active.is_some() || !self.waiting.is_empty() || self.last.position != self.position
+        self.is_moving() || !self.waiting.is_empty() || self.last.position != self.position
     }
 
-    /// Whether the arm rests, nobody wants it to move, and nobody keeps it at rest.
+    /// Whether a move or a plan has the arm.
+    const fn is_moving(&self) -> bool {
+        self.active.is_some() || self.plan.has_the_arm()
+    }
+
+    /// Whether the arm rests, may move, and nobody wants it to do either.
     pub fn is_idle(&self) -> bool {
-        !self.is_busy() && self.resting_for.is_none()
+        !self.is_busy() && self.resting_for.is_none() && self.stopped.is_none()
     }
 
     /// Where the nib is now: the position of the last set-point, or where the arm rests.
     pub const fn position(&self) -> Position {
-        match self.active {
-            Some(_) => self.last.position,
-            None => self.position,
+        if self.is_moving() {
+            self.last.position
+        } else {
+            self.position
         }
     }
 
-    /// Where the servos are now, in the model's angles.
-    pub fn angles(&self) -> Angles {
-        inverse(self.position(), self.data.lift)
-    }
-
-    /// What the board says about the arm.
+    /// What the board says about the arm, with the servos' directions in it.
     pub const fn data(&self) -> &ArmData {
         &self.data
     }
@@ -406,38 +306,6 @@ impl Machine {
         self.steps = steps;
     }
 
-    /// The calibration in force.
-    pub const fn calibration(&self) -> Calibration {
-        self.calibration
-    }
-
-    /// The calibration by which the servos, as they stand now, stand at the calibration point, which
-    /// is home (`reference/arm.md`, calibration).
-    pub fn calibration_here(&self) -> Calibration {
-        Calibration::between(self.told(), HOME_ANGLES)
-    }
-
-    /// Puts a calibration in force. The servos stay where they are, and the arm's position becomes
-    /// what they now mean; where that is outside the drawing area or its heights, they go to its edge in
-    /// the next frame.
-    pub fn set_calibration(&mut self, calibration: Calibration) {
-        let model = calibration.remove(self.told());
-        self.calibration = calibration;
-        let position = if model == HOME_ANGLES {
-            HOME
-        } else {
-            forward(model, self.data.lift)
-        };
-        (self.position, _) = hold(position);
-        self.active = None;
-    }
-
-    /// What the servos were told last, or at rest will have been told at the next frame, calibration
-    /// included.
-    fn told(&self) -> Angles {
-        self.calibration.apply(self.angles())
-    }
-
     #[inline]
     fn begin(&mut self, client: Client, errand: &Errand) -> Report {
         match errand {
@@ -446,6 +314,13 @@ impl Machine {
                 self.lift_at = None;
                 self.start(*manner, target)
             }
+            Errand::Uncalibrated(target, bare) => {
+                self.last_mover = Some(client);
+                self.lift_at = None;
+                let (target, limited) = self.without_offsets(target, *bare);
+                self.start_limited(Manner::Straight, &target, limited)
+            }
+            Errand::Dwell(duration) => self.dwell_for(*duration),
             Errand::Wave => self.wave(),
             Errand::Rest => {
                 self.resting_for = Some(client);
@@ -470,8 +345,33 @@ impl Machine {
         }
     }
 
+    fn dwell_for(&mut self, duration: Micros) -> Report {
+        let duration = duration.min(MOST_DWELL);
+        self.active = Some(Active {
+            begun: self.clock,
+            ends: self.clock + duration,
+            short: self.short,
+            motion: Motion::Dwell(self.position, duration),
+        });
+        Report::Moving {
+            end: self.position,
+            limited: None,
+        }
+    }
+
     fn start(&mut self, manner: Manner, target: &Target) -> Report {
-        let (end, mut limited) = self.reachable(target);
+        self.start_limited(manner, target, None)
+    }
+
+    /// Starts a move whose target has been limited before.
+    fn start_limited(
+        &mut self,
+        manner: Manner,
+        target: &Target,
+        before: Option<Limited>,
+    ) -> Report {
+        let (end, limited) = self.reachable(target);
+        let mut limited = before.or(limited);
         let motion = match manner {
             Manner::Straight => Motion::Line(Line::new(self.position, end, self.steps)),
             Manner::Rapid => Motion::Rapid(Rapid::new(
@@ -498,10 +398,7 @@ impl Machine {
     fn reachable(&self, target: &Target) -> (Position, Option<Limited>) {
         let x = target.x.unwrap_or(self.position.x.into());
         let y = target.y.unwrap_or(self.position.y.into());
-        let z = target.z.map_or(self.position.z, |z| {
-            let within = z.bits().clamp(PEN_DOWN.bits().into(), PEN_UP.bits().into());
-            Coordinate::from_bits(within as i32)
-        });
+        let z = target.z.map_or(self.position.z, fitting::within_lift);
         let (near_x, near_y) = closest(x, y);
         let mut end = Position {
             x: near_x,
@@ -536,7 +433,7 @@ impl Machine {
 
     #[inline]
     fn pulses(&self, position: Position) -> Pulses {
-        let told = self.calibration.apply(inverse(position, self.data.lift));
+        let told = self.calibration.apply(self.angles_at(position));
         let [shoulder, elbow, pen] = &self.data.servos;
         [
             shoulder.pulse(told.shoulder),
@@ -544,16 +441,6 @@ impl Machine {
             pen.pulse(told.pen),
         ]
     }
-}
-
-/// Where the nib of an arm without offsets is when its servos are given `pulses`: forward kinematics,
-/// for pictures of what the arm did.
-pub fn position_of(pulses: Pulses, data: &ArmData) -> Position {
-    let mut angles = [Microdegrees::default(); 3];
-    for ((angle, servo), pulse) in angles.iter_mut().zip(&data.servos).zip(pulses) {
-        *angle = servo.angle(pulse);
-    }
-    forward(Angles::from_array(angles), data.lift)
 }
 
 #[cfg(test)]

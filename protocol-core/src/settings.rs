@@ -1,13 +1,16 @@
 //! What the arm remembers, and its form in memory.
 
+mod origin;
 mod parts;
 mod record;
 
+pub use origin::{AllowedOrigin, MAX_ORIGIN, Origin};
 pub use record::MAX_RECORD;
 
-use crate::arm::Calibration;
+use crate::arm::{Calibration, Compensation, Directions, NibShift, ZMap};
+use crate::drawings::ButtonDraws;
 use crate::update::ManifestAddress;
-use crate::wifi::Networks;
+use crate::wifi::{Networks, Password};
 use heapless::String;
 
 /// Longest machine name, in bytes.
@@ -124,14 +127,34 @@ pub struct Settings {
     pub start: StartMode,
     /// How its own network is called (M552).
     pub access_point: AccessPointName,
+    /// Password of its own network, which is open without one (M589). Never shown.
+    pub own_password: Option<Password>,
     /// Whether it makes its little waves (M291).
     pub waves: bool,
+    /// What a short press of its button draws (M23).
+    pub button: ButtonDraws,
+    /// How high the paper lies (G31).
+    pub map: ZMap,
+    /// How the nib moves as it comes down (G31).
+    pub shift: NibShift,
+    /// Which servos turn the other way (M280).
+    pub directions: Directions,
+    /// Whose pages may drive the arm through its web interface, beside its own.
+    pub allowed_origin: AllowedOrigin,
     /// Where updates are asked for (M997).
     pub update_address: Option<ManifestAddress>,
 }
 
+impl Settings {
+    /// Map and shift, ready for use.
+    pub fn compensation(&self) -> Compensation {
+        Compensation::new(self.map, self.shift)
+    }
+}
+
 impl Default for Settings {
-    /// `line-us`, no calibration, no network, a station that waves.
+    /// `line-us`, no calibration, no network, its own one open, a station that waves, on flat paper, pages
+    /// from elsewhere kept out, and a button that draws the next drawing.
     fn default() -> Self {
         Self {
             name: MachineName::default(),
@@ -139,8 +162,14 @@ impl Default for Settings {
             networks: Networks::new(),
             start: StartMode::default(),
             access_point: AccessPointName::default(),
+            own_password: None,
             waves: true,
             update_address: None,
+            button: ButtonDraws::default(),
+            map: ZMap::FLAT,
+            shift: NibShift::NONE,
+            directions: Directions::default(),
+            allowed_origin: AllowedOrigin::None,
         }
     }
 }

@@ -89,6 +89,30 @@ pub fn measure(setup: bool) -> Result<Vec<Row>> {
             peers: vec![("f32 with libm", of("set-point, f32 with libm")?)],
         },
         Row {
+            work: "set-point with map and shift",
+            goal: Goal::Instructions(550),
+            measured: of("set-point, map and shift")?,
+            peers: vec![],
+        },
+        Row {
+            work: "set-point of a plan",
+            goal: Goal::Instructions(450),
+            measured: of("set-point of a plan")?,
+            peers: vec![],
+        },
+        Row {
+            work: "plan a segment",
+            goal: Goal::Instructions(8_000),
+            measured: of("plan a segment")?,
+            peers: vec![],
+        },
+        Row {
+            work: "begin a segment",
+            goal: Goal::Instructions(5_000),
+            measured: of("set-point that begins a segment")?,
+            peers: vec![],
+        },
+        Row {
             work: "G01 over TCP",
             goal: Goal::Times(1.25),
             measured: round_trip(&firmware)?,
@@ -128,8 +152,10 @@ fn round_trip(program: &Path) -> Result<u64> {
     let folder = tempfile::tempdir()?;
     let options = Options {
         line_us: free_address()?,
+        web: None,
         flash: folder.path().join("flash.img"),
         time: Time::Instructions,
+        serial: None,
     };
     let mut emulator = Emulator::boot(program, &options)?;
     emulator.wait_ready()?;

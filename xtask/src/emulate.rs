@@ -6,6 +6,7 @@ use firmware::board::Servos;
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder};
 use protocol_core::machine::ArmData;
 use std::io::BufRead;
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::time::Duration;
@@ -19,8 +20,12 @@ pub fn emulate(options: Emulate, setup: bool) -> Result<()> {
     let firmware = Board::Virt.build(Board::Virt.binary(), &[], setup)?;
     let machine = Options {
         line_us: options.line_us,
+        web: Some(options.web),
         flash: options.flash,
         time: Time::Wall,
+        serial: options
+            .serial_tcp
+            .map(|address| format!("tcp:{address},server=on,wait=off,nodelay=on")),
     };
     let outputs = Outputs {
         trace: options.trace,
@@ -30,9 +35,10 @@ pub fn emulate(options: Emulate, setup: bool) -> Result<()> {
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;
     println!("picture: {}; stop with Ctrl-C", options.picture.display());
     let typed = read_keyboard();
+    let addresses = (options.line_us, options.web);
     let outcome = loop {
         let mut emulator = Emulator::boot(&firmware, &machine)?;
-        match follow(&mut emulator, &mut servos, options.line_us, &typed) {
+        match follow(&mut emulator, &mut servos, addresses, &typed) {
             Ok(Ended::Restart) => println!("the machine starts again"),
             Ok(Ended::Stopped) => break Ok(()),
             Err(error) => break Err(error),
@@ -53,7 +59,7 @@ enum Ended {
 fn follow(
     emulator: &mut Emulator,
     servos: &mut RecordedServos,
-    line_us: std::net::SocketAddr,
+    (line_us, web): (SocketAddr, SocketAddr),
     typed: &std::sync::mpsc::Receiver<String>,
 ) -> Result<Ended> {
     let mut shown = [[0; 3]; 2];
@@ -68,7 +74,7 @@ fn follow(
         if let Some(line) = next {
             println!("{line}");
             if line.contains("Line-us clients") {
-                println!("  on this computer: {line_us}");
+                println!("  on this computer: {line_us}, and the page: http://{web}/");
             }
         }
         while let Ok(line) = typed.try_recv() {

@@ -34,10 +34,14 @@ pub const RESTART: i32 = 102;
 pub struct Options {
     /// Where this computer's clients connect.
     pub line_us: SocketAddr,
+    /// Where this computer's browsers connect, if they are to.
+    pub web: Option<SocketAddr>,
     /// The flash's file; made, erased, if it does not exist.
     pub flash: PathBuf,
     /// What the machine takes for time.
     pub time: Time,
+    /// What is at the other end of its serial line, as QEMU's `-serial` takes it; nothing if `None`.
+    pub serial: Option<String>,
 }
 
 /// What an emulated machine takes for time.
@@ -210,7 +214,7 @@ pub fn free_address() -> Result<SocketAddr> {
 fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
     let [records, console, monitor] = [RECORDS, CONSOLE, MONITOR].map(|name| folder.join(name));
     let mut qemu = machine(firmware, options.time);
-    qemu.args(["-serial", "none"])
+    qemu.args(["-serial", options.serial.as_deref().unwrap_or("none")])
         .arg("-monitor")
         .arg(format!("unix:{},server=on,wait=off", monitor.display()))
         .arg("-chardev")
@@ -229,7 +233,7 @@ fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
         ])
         .args(["-device", "virtconsole,bus=c1.0,chardev=console"])
         .arg("-netdev")
-        .arg(format!("user,id=n0,hostfwd=tcp:{}-:1337", options.line_us))
+        .arg(forwards(options))
         .args(["-device", "virtio-net-device,netdev=n0"])
         .arg("-drive")
         .arg(format!(
@@ -238,6 +242,15 @@ fn command(firmware: &Path, options: &Options, folder: &Path) -> Command {
         ))
         .args(["-device", "virtio-blk-device,drive=d0"]);
     qemu
+}
+
+/// Which of this computer's ports lead to the machine's.
+fn forwards(options: &Options) -> String {
+    let address = options.line_us;
+    // Its name service is asked at the same number, which is another port with UDP.
+    let line_us = format!("hostfwd=tcp:{address}-:1337,hostfwd=udp:{address}-:5353");
+    let web = options.web.map(|web| format!(",hostfwd=tcp:{web}-:80"));
+    format!("user,id=n0,{line_us}{}", web.unwrap_or_default())
 }
 
 /// The bare machine, for a program that needs nothing around it.

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod board;
 pub mod emulator;
+pub mod ready;
 pub mod records;
 pub mod release;
 pub mod size;

@@ -1,5 +1,6 @@
 //! The developer's commands.
 
+mod browser;
 mod emulate;
 mod image;
 mod table;
@@ -14,6 +15,7 @@ use std::process::{Command, ExitCode};
 use xtask::bench;
 use xtask::board::{Board, root, run};
 use xtask::emulator::QEMU;
+use xtask::ready::Owner;
 use xtask::release;
 use xtask::toolchain::require;
 
@@ -46,11 +48,18 @@ enum Task {
         /// The serial port; found by itself where there is only one
         #[arg(long)]
         port: Option<String>,
+        #[command(flatten)]
+        owner: Owner,
     },
     /// Build, and make one file to write at the beginning of a chip's flash
+    ///
+    /// With a network or a name, the arm has these when it first starts, and what it remembered before is
+    /// gone. For virt it makes a file for `emulate --flash`.
     Image {
         /// The board
         board: Board,
+        #[command(flatten)]
+        owner: Owner,
     },
     /// Make what is served to arms for M997: keys, images, manifests
     Release(Release),
@@ -63,6 +72,8 @@ enum Task {
         #[arg(long)]
         csv: bool,
     },
+    /// Run the tests of the page that the arm serves, in a browser too
+    Page,
     /// Run everything that must pass: format, lints, documentation, tests, emulator, images
     Test,
 }
@@ -110,6 +121,12 @@ struct Emulate {
     /// Where Line-us clients connect
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:1337")]
     line_us: SocketAddr,
+    /// Where laser software connects to the serial line, over TCP
+    #[arg(long, value_name = "ADDR")]
+    serial_tcp: Option<SocketAddr>,
+    /// Where browsers on this computer connect
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
+    web: SocketAddr,
     /// The machine's flash, kept between runs; made if it does not exist
     #[arg(long, value_name = "FILE", default_value = "quill.flash")]
     flash: PathBuf,
@@ -142,9 +159,9 @@ fn perform(cli: Cli) -> Result<()> {
             require(QEMU.0, QEMU.1, setup)?;
             emulate::emulate(options, setup)
         }
-        Task::Flash { board, port } => flash(board, port.as_deref(), setup),
-        Task::Image { board } => {
-            println!("{}", image::image(board, setup)?.display());
+        Task::Flash { board, port, owner } => flash(board, port.as_deref(), &owner, setup),
+        Task::Image { board, owner } => {
+            println!("{}", image::image(board, &owner, setup)?.display());
             Ok(())
         }
         Task::Release(what) => make_release(what, setup),
@@ -154,6 +171,7 @@ fn perform(cli: Cli) -> Result<()> {
             table::bench(&bench::measure(setup)?, csv);
             Ok(())
         }
+        Task::Page => browser::test(setup),
         Task::Test => test::everything(setup),
     }
 }
@@ -195,7 +213,7 @@ fn make_release(what: Release, setup: bool) -> Result<()> {
     Ok(())
 }
 
-fn flash(board: Board, port: Option<&str>, setup: bool) -> Result<()> {
+fn flash(board: Board, port: Option<&str>, owner: &Owner, setup: bool) -> Result<()> {
     if !board.is_chip() {
         bail!("{} is not a chip", board.name());
     }
@@ -207,7 +225,7 @@ fn flash(board: Board, port: Option<&str>, setup: bool) -> Result<()> {
         }
         run(Command::new("cargo").args(["install", "espflash", "--locked"]))?;
     }
-    let image = image::image(board, setup)?;
+    let image = image::image(board, owner, setup)?;
     let mut espflash = Command::new("espflash");
     espflash.args(["write-bin", "--chip", board.name()]);
     if let Some(port) = port {

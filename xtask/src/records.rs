@@ -70,6 +70,7 @@ fn next(bytes: &[u8]) -> Result<Option<(Record, &[u8])>> {
                     pulses,
                     held: flags & 1 != 0,
                     moving: flags & 2 != 0,
+                    outputs: [8, 16, 32].map(|output| flags & output != 0),
                 };
                 Record::Frame(Frame {
                     time,

@@ -1,6 +1,7 @@
 //! Figures for people and for scripts.
 
 use anyhow::Result;
+use firmware::services::web::PAGE_SIZE;
 use xtask::bench::{Goal, Row};
 use xtask::board::Board;
 use xtask::size::Size;
@@ -36,6 +37,7 @@ pub fn sizes(setup: bool) -> Result<()> {
             println!("{:<10} MISSED", board.name());
         }
     }
+    println!("{:<10} {:<12} {PAGE_SIZE:>12}", "each", "page");
     Ok(())
 }
 
@@ -44,13 +46,12 @@ pub fn bench(rows: &[Row], csv: bool) {
     if csv {
         println!("work,goal,measured,peer,peer_measured");
         for row in rows {
+            let own = format!("{},{},{}", row.work, row.most(), row.measured);
             for (peer, count) in &row.peers {
-                println!(
-                    "{},{},{},{peer},{count}",
-                    row.work,
-                    row.most(),
-                    row.measured
-                );
+                println!("{own},{peer},{count}");
+            }
+            if row.peers.is_empty() {
+                println!("{own},,");
             }
         }
         return;

@@ -6,11 +6,13 @@ use std::process::Command;
 use std::time::Instant;
 use xtask::board::{Board, own_cargo, root, run};
 use xtask::emulator::QEMU;
+use xtask::ready::Owner;
 use xtask::toolchain::require;
 
 /// Runs all checks, the quick ones first, up to the first that fails.
 pub fn everything(setup: bool) -> Result<()> {
     require(QEMU.0, QEMU.1, setup)?;
+    crate::browser::require_programs(setup)?;
     step("format", || run(cargo().args(["fmt", "--all", "--check"])))?;
     step("lints", || {
         run(cargo().args([
@@ -36,6 +38,7 @@ pub fn everything(setup: bool) -> Result<()> {
     step("tests", || {
         run(cargo().args(["test", "--workspace", "--locked"]))
     })?;
+    step("page", || crate::browser::test(setup))?;
     step("fuzzing", fuzz)?;
     step("lints for the chips", || {
         Board::Virt.lint(&["virt", "echo", "bench"], &["bench"], setup)?;
@@ -65,7 +68,10 @@ pub fn everything(setup: bool) -> Result<()> {
     })?;
     for board in Board::CHIPS {
         step(&format!("image for {}", board.name()), || {
-            println!("{}", crate::image::image(board, setup)?.display());
+            println!(
+                "{}",
+                crate::image::image(board, &Owner::default(), setup)?.display()
+            );
             Ok(())
         })?;
     }
@@ -91,19 +97,22 @@ fn fuzz() -> Result<()> {
         println!("skipped: cargo install cargo-fuzz --locked");
         return Ok(());
     }
-    let mut fuzz = Command::new("cargo");
-    for variable in ["CARGO", "RUSTUP_TOOLCHAIN"] {
-        fuzz.env_remove(variable);
+    for target in ["session", "lasaur"] {
+        let mut fuzz = Command::new("cargo");
+        for variable in ["CARGO", "RUSTUP_TOOLCHAIN"] {
+            fuzz.env_remove(variable);
+        }
+        fuzz.current_dir(root().join("host-tests")).args([
+            "+nightly",
+            "fuzz",
+            "run",
+            target,
+            "--",
+            "-max_total_time=20",
+        ]);
+        run(&mut fuzz)?;
     }
-    fuzz.current_dir(root().join("host-tests")).args([
-        "+nightly",
-        "fuzz",
-        "run",
-        "session",
-        "--",
-        "-max_total_time=20",
-    ]);
-    run(&mut fuzz)
+    Ok(())
 }
 
 fn step(name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {

@@ -23,6 +23,11 @@ pub const BOARD: Board = Board {
     },
     button_pin: 0,
     serial: SerialPort { tx: 1, rx: 3 },
+    // Air assist, aux1, aux2.
+    outputs: [None; 3],
+    door_open: None,
+    chiller_off: None,
+    power_off: None,
     // Flash 6 to 11, inputs only 34 to 39.
     reserved_pins: &[6, 7, 8, 9, 10, 11, 34, 35, 36, 37, 38, 39],
 };

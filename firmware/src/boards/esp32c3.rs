@@ -21,6 +21,11 @@ pub const BOARD: Board = Board {
     },
     button_pin: 9,
     serial: SerialPort { tx: 21, rx: 20 },
+    // Air assist, aux1, aux2.
+    outputs: [None; 3],
+    door_open: None,
+    chiller_off: None,
+    power_off: None,
     // Flash 11 to 17, USB 18 and 19.
     reserved_pins: &[11, 12, 13, 14, 15, 16, 17, 18, 19],
 };

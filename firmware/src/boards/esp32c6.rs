@@ -21,6 +21,11 @@ pub const BOARD: Board = Board {
     },
     button_pin: 9,
     serial: SerialPort { tx: 16, rx: 17 },
+    // Air assist, aux1, aux2.
+    outputs: [None; 3],
+    door_open: None,
+    chiller_off: None,
+    power_off: None,
     // USB 12 and 13, flash 24 to 30.
     reserved_pins: &[12, 13, 24, 25, 26, 27, 28, 29, 30],
 };

@@ -21,6 +21,11 @@ pub const BOARD: Board = Board {
     },
     button_pin: 0,
     serial: SerialPort { tx: 43, rx: 44 },
+    // Air assist, aux1, aux2.
+    outputs: [None; 3],
+    door_open: None,
+    chiller_off: None,
+    power_off: None,
     // USB 19 and 20, flash and PSRAM 26 to 37.
     reserved_pins: &[19, 20, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37],
 };

@@ -7,12 +7,13 @@ use crate::board::{Frames, Servos};
 use core::array;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::{Mutex as Turns, MutexGuard as Turn};
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
-use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report};
+use protocol_core::machine::{Client, Errand, MAX_ASKERS, Machine, Report, StopReason};
 use protocol_core::motion::Micros;
 
 /// The arm as its clients see it.
@@ -22,6 +23,8 @@ pub struct Arm {
     /// Several services ask in the name of [`Client::HOUSE`], which has one errand at a time as well.
     house: Turns<CriticalSectionRawMutex, ()>,
     ticks: AtomicU32,
+    /// For the serial port's task alone.
+    plan_changed: Signal<CriticalSectionRawMutex, ()>,
 }
 
 impl Arm {
@@ -32,6 +35,7 @@ impl Arm {
             reports: array::from_fn(|_| Signal::new()),
             house: Turns::new(()),
             ticks: AtomicU32::new(0),
+            plan_changed: Signal::new(),
         }
     }
 
@@ -50,6 +54,29 @@ impl Arm {
         match self.with(|machine| machine.take(client, errand)) {
             Some(report) => report,
             None => signal.wait().await,
+        }
+    }
+
+    /// As [`Self::errand`], but where the errand has not begun when `cancel` ends, it is taken back, and
+    /// there is no report.
+    pub async fn errand_unless(
+        &self,
+        client: Client,
+        errand: &Errand,
+        cancel: impl Future<Output = ()>,
+    ) -> Option<Report> {
+        let signal = self.reports.get(client.slot())?;
+        signal.reset();
+        if let Some(report) = self.with(|machine| machine.take(client, errand)) {
+            return Some(report);
+        }
+        if let Either::First(report) = select(signal.wait(), cancel).await {
+            return Some(report);
+        }
+        // Between the two it may have begun.
+        match self.with(|machine| machine.withdraw(client)) {
+            true => None,
+            false => Some(signal.wait().await),
         }
     }
 
@@ -81,6 +108,37 @@ impl Arm {
     /// Counts frames that had their set-point: what stands still is dead.
     pub fn ticks(&self) -> u32 {
         self.ticks.load(Ordering::Relaxed)
+    }
+
+    /// Waits until the plan has room for a segment; a stop makes room.
+    pub async fn room(&self) {
+        self.until(|machine| machine.plan_room() > 0).await;
+    }
+
+    /// Waits until everything planned has been done, or forgotten in a stop.
+    pub async fn plan_done(&self) {
+        self.until(Machine::plan_is_done).await;
+    }
+
+    async fn until(&self, holds: impl Fn(&Machine) -> bool) {
+        while !self.with(|machine| holds(machine)) {
+            self.plan_changed.wait().await;
+        }
+    }
+
+    /// Stops the arm, whoever moves it, and answers those who wait for a move.
+    pub fn stop(&self, reason: StopReason) {
+        self.with(|machine| machine.stop(reason));
+        self.deliver();
+    }
+
+    /// Lets a stopped arm move again; says whether it was stopped.
+    pub fn resume(&self) -> bool {
+        self.with(|machine| {
+            let stopped = machine.stopped().is_some();
+            machine.resume();
+            stopped
+        })
     }
 
     /// The servo tick: one set-point in each of the servos' frames, which are `length` apart, for ever.
@@ -121,6 +179,9 @@ impl Arm {
             if let Some(signal) = self.reports.get(client.slot()) {
                 signal.signal(report);
             }
+        }
+        if self.with(Machine::plan_has_changed) {
+            self.plan_changed.signal(());
         }
     }
 }

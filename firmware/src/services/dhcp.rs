@@ -1,5 +1,6 @@
 //! Addresses for the guests of the machine's own network.
 
+use super::portal;
 use crate::log::warning;
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use edge_dhcp::io::{self, DEFAULT_SERVER_PORT};
@@ -24,7 +25,7 @@ pub async fn serve(udp: &impl UdpBind) -> ! {
     server.range_start = Ipv4Addr::new(192, 168, 4, 2);
     server.range_end = Ipv4Addr::new(192, 168, 4, 1 + LEASES as u8);
     let mut gateway = [Ipv4Addr::UNSPECIFIED];
-    let options = ServerOptions::new(OWN_ADDRESS, Some(&mut gateway));
+    let options = options(&mut gateway);
     let mut packet = [0; MAX_PACKET];
     loop {
         if let Ok(mut socket) = udp.bind(any).await {
@@ -33,5 +34,54 @@ pub async fn serve(udp: &impl UdpBind) -> ! {
         }
         warning!("the address service starts again");
         Timer::after_secs(1).await;
+    }
+}
+
+/// What guests are told beside their address: the machine is their router and knows all names, and where the
+/// setup page is (option 114, RFC 8910).
+fn options(gateway: &mut [Ipv4Addr; 1]) -> ServerOptions<'_> {
+    let mut options = ServerOptions::new(OWN_ADDRESS, Some(gateway));
+    options.dns = &[OWN_ADDRESS];
+    options.captive_url = Some(portal::URL);
+    options
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use edge_dhcp::{Options, Packet};
+
+    /// A request of a phone (RFC 2131, section 2): discover, and what it wants to know.
+    fn discover() -> Vec<u8> {
+        let mut packet = vec![1, 1, 6, 0, 1, 2, 3, 4];
+        packet.resize(28, 0);
+        packet.extend([2, 0, 0, 0, 0, 9]);
+        packet.resize(236, 0);
+        packet.extend([99, 130, 83, 99, 53, 1, 1, 55, 4, 1, 3, 6, 114, 255]);
+        packet
+    }
+
+    #[test]
+    fn a_guest_is_told_what_brings_up_the_setup_page() {
+        let mut server = Server::<_, LEASES>::new(|| 0, OWN_ADDRESS);
+        let mut gateway = [Ipv4Addr::UNSPECIFIED];
+        let options = options(&mut gateway);
+        let asked = discover();
+        let request = Packet::decode(&asked).unwrap();
+        let mut buffer = Options::buf();
+        let offer = server.handle_request(&mut buffer, &options, &request);
+        let mut bytes = [0; MAX_PACKET];
+        let offer = offer.unwrap().encode(&mut bytes).unwrap();
+        let mut url = vec![114, 19];
+        url.extend(b"http://192.168.4.1/");
+        for (what, option) in [
+            ("subnet", &[1, 4, 255, 255, 255, 0][..]),
+            ("router", &[3, 4, 192, 168, 4, 1]),
+            ("names", &[6, 4, 192, 168, 4, 1]),
+            ("setup page", &url),
+        ] {
+            let found = offer.windows(option.len()).any(|bytes| bytes == option);
+            assert!(found, "{what}: {offer:?}");
+        }
     }
 }

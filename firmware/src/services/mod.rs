@@ -2,21 +2,36 @@
 
 pub mod arm;
 pub mod dhcp;
+pub mod discovery;
+pub mod drawer;
+pub mod drawings;
+pub mod job;
 pub mod line_us;
+pub mod names;
 pub mod network;
 pub mod panel;
+pub mod portal;
+pub mod serial;
 pub mod storage;
 pub mod update;
+pub mod web;
 
 use crate::board::Vitals;
 use arm::Arm;
-use core::cell::RefCell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::cell::{Cell, RefCell};
+use core::net::IpAddr;
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use discovery::Discovery;
+use drawer::Drawer;
+use drawings::Drawings;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Duration, Instant, Timer};
+use job::Job;
 use network::Wifi;
 use panel::Panel;
+use protocol_core::arm::Calibration;
+use protocol_core::drawings::Slot;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, Machine};
 use protocol_core::motion::WAVE;
@@ -30,12 +45,24 @@ pub struct House {
     pub arm: Arm,
     /// Where settings go.
     pub store: Store,
+    /// The drawings that it keeps.
+    pub drawings: Drawings,
+    /// What is drawn of them.
+    pub drawer: Drawer,
     /// The network to be in.
     pub wifi: Wifi,
+    /// How the machine is found.
+    pub discovery: Discovery,
     /// Light and button.
     pub panel: Panel,
     /// New firmware.
     pub update: Update,
+    /// The drawing that the machine draws by itself.
+    pub job: Job,
+    /// Line-us clients that are connected.
+    pub clients: AtomicU8,
+    /// Under which the machine can be reached, if it knows.
+    pub address: Mutex<CriticalSectionRawMutex, Cell<Option<IpAddr>>>,
     /// Who this machine is.
     pub identity: Identity,
     /// How it is.
@@ -48,12 +75,21 @@ pub struct House {
 impl House {
     /// An arm at home, with the settings it remembers.
     pub fn new(data: ArmData, settings: Settings, identity: Identity, vitals: Vitals) -> Self {
+        let mut machine = Machine::new(data, settings.calibration);
+        machine.set_compensation(settings.compensation());
+        machine.set_directions(settings.directions);
         Self {
-            arm: Arm::new(Machine::new(data, settings.calibration)),
+            arm: Arm::new(machine),
             store: Store::new(),
+            drawings: Drawings::new(),
+            drawer: Drawer::new(),
             wifi: Wifi::new(),
+            discovery: Discovery::new(),
             panel: Panel::new(),
             update: Update::new(),
+            job: Job::new(),
+            clients: AtomicU8::new(0),
+            address: Mutex::new(Cell::new(None)),
             identity,
             vitals,
             settings: Mutex::new(RefCell::new(settings)),
@@ -95,12 +131,38 @@ impl House {
     /// Forgets everything: factory reset.
     ///
     /// # Errors
-    /// When the memory does not take it: nothing has changed then.
+    /// When the memory does not take it: nothing has changed then, or drawings are left.
     async fn forget_everything(&self) -> Result<(), StoreError> {
         let forget = |settings: &mut Settings| *settings = Settings::default();
         self.change(Client::HOUSE, forget).await?;
+        self.drawer.set_replay(None);
+        self.drawer.stop();
+        let mut outcome = Ok(());
+        for (slot, _) in self.drawings.contents().iter() {
+            let deleted = self.drawings.delete(slot, Client::HOUSE, &self.arm).await;
+            outcome = outcome.and(deleted.map_err(|_| StoreError));
+        }
         self.wifi.restart();
-        Ok(())
+        outcome
+    }
+
+    /// Which drawing a short press of the button draws now.
+    fn drawing_for_button(&self) -> Option<Slot> {
+        let choice = self.settings(|settings| settings.button);
+        // When somebody presses a button is as good as any dice.
+        let random = Instant::now().as_micros() as u32;
+        choice.choose(&self.drawings.contents(), self.drawer.last(), random)
+    }
+
+    /// Draws the drawing of the button, unless the arm has something else to do.
+    fn draw_by_button(&self) {
+        let idle = self.arm.with(|machine| machine.is_idle());
+        if let Some(slot) = self.drawing_for_button()
+            && idle
+        {
+            // Of two presses at once one is enough.
+            let _ = self.drawer.draw(slot);
+        }
     }
 
     /// Changes settings: waits until the arm rests, and keeps it at rest while the changed settings are
@@ -129,12 +191,32 @@ impl House {
         Ok(answer)
     }
 
+    /// Makes the place where the arm rests the calibration point, or removes the calibration.
+    async fn calibrate(&self, here: bool, client: Client) -> Result<(), StoreError> {
+        let calibrate = |settings: &mut Settings| {
+            settings.calibration = match here {
+                true => self.arm.with(|machine| machine.calibration_here()),
+                false => Calibration::default(),
+            };
+        };
+        self.change(client, calibrate).await
+    }
+
     fn put_in_force(&self, new: Settings) {
-        let calibration = new.calibration;
+        let (calibration, directions) = (new.calibration, new.directions);
+        let (map, shift, compensation) = (new.map, new.shift, new.compensation());
         let old = self.settings.lock(|settings| settings.replace(new));
-        if old.calibration != calibration {
-            self.arm
-                .with(|machine| machine.set_calibration(calibration));
-        }
+        self.discovery.renamed();
+        self.arm.with(|machine| {
+            if old.calibration != calibration {
+                machine.set_calibration(calibration);
+            }
+            if (old.map, old.shift) != (map, shift) {
+                machine.set_compensation(compensation);
+            }
+            if old.directions != directions {
+                machine.set_directions(directions);
+            }
+        });
     }
 }

@@ -7,9 +7,8 @@ use super::House;
 use crate::board::{Address, Radio};
 use crate::log::{info, warning};
 use core::cell::RefCell;
-use core::cmp::Reverse;
 use core::pin::pin;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_futures::join::join;
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::Mutex;
@@ -25,7 +24,7 @@ use protocol_core::wifi::{
     Effect, Event, Heard, Job, Joined, MAX_HEARD, Network, Phase, Policy, Status,
 };
 
-/// Time for the reply to `M587` to reach its client before the network changes.
+/// Time for the reply to `M587` or `M171` to reach its client before the network changes.
 const GRACE: Duration = Duration::from_millis(500);
 /// Longest time that a list of networks takes; clients wait 5 s for a reply.
 const LIST_AT_MOST: Duration = Duration::from_secs(4);
@@ -51,6 +50,8 @@ pub struct Wifi {
     heard: Mutex<CriticalSectionRawMutex, RefCell<Vec<Heard, MAX_HEARD>>>,
     /// The radio has time to listen.
     idle: AtomicBool,
+    /// Networks that were joined or opened so far.
+    connection: AtomicU32,
     listed: Signal<CriticalSectionRawMutex, ()>,
 }
 
@@ -73,6 +74,7 @@ impl Wifi {
             })),
             heard: Mutex::new(RefCell::new(Vec::new())),
             idle: AtomicBool::new(false),
+            connection: AtomicU32::new(0),
             listed: Signal::new(),
         }
     }
@@ -80,6 +82,17 @@ impl Wifi {
     /// What the network is doing.
     pub fn status(&self) -> Status {
         self.status.lock(|status| status.borrow().clone())
+    }
+
+    /// Another number for each time that a network was joined, or the own one opened.
+    pub fn connection(&self) -> u32 {
+        self.connection.load(Ordering::Relaxed)
+    }
+
+    fn connected(&self) {
+        // Nobody else writes it.
+        let connection = self.connection().wrapping_add(1);
+        self.connection.store(connection, Ordering::Relaxed);
     }
 
     /// Whether the machine is on its own network, for setup.
@@ -97,7 +110,7 @@ impl Wifi {
         self.put(Input::Changed);
     }
 
-    /// Everything has been forgotten.
+    /// Everything has been forgotten: begins anew, a little later.
     pub fn restart(&self) {
         self.put(Input::Restart);
     }
@@ -233,6 +246,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                         Joined::Yes => {
                             info!("network joined");
                             self.address.ask();
+                            self.house.wifi.connected();
                             self.is_joined = true;
                         }
                         Joined::NotFound => warning!("network not found"),
@@ -267,14 +281,13 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                     Either::Second(input) => Some(input),
                 }
             }
-            Job::Open(name) => {
-                let own = Network {
-                    ssid: name.clone(),
-                    password: None,
-                };
-                self.is_open = self.radio.open_access_point(&own).await.is_ok();
+            Job::Open(own) => {
+                self.is_open = self.radio.open_access_point(own).await.is_ok();
                 match self.is_open {
-                    true => info!("setup network opened"),
+                    true => {
+                        self.house.wifi.connected();
+                        info!("setup network opened");
+                    }
                     false => warning!("setup network not opened"),
                 }
                 self.on(Event::Opened(self.is_open));
@@ -289,9 +302,14 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                         Either::Second(Input::List) => {
                             let scan = self.radio.scan(&mut self.heard);
                             let _ = select(&mut serving, scan).await;
-                            keep_heard(&mut self.heard, &self.house.wifi);
+                            keep_heard(&self.heard, &self.house.wifi);
                             self.house.wifi.listed.signal(());
                             continue;
+                        }
+                        // The own network goes on until the reply to M587 has reached its client.
+                        Either::Second(input @ Input::Try(_)) => {
+                            select(&mut serving, Timer::after(GRACE)).await;
+                            input
                         }
                         Either::Second(input) => input,
                     };
@@ -303,13 +321,17 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
 
     async fn take(&mut self, input: Input) {
         match input {
-            Input::Press(gesture) => self.on(Event::Press(gesture)),
-            Input::Try(network) => {
-                Timer::after(GRACE).await;
-                self.on(Event::Try(network));
+            Input::Press(Gesture::Short) if self.house.drawing_for_button().is_some() => {
+                self.on(Event::PressToDraw);
             }
+            Input::Press(gesture) => self.on(Event::Press(gesture)),
+            Input::Try(network) => self.on(Event::Try(network)),
             Input::Changed => self.on(Event::Changed),
-            Input::Restart => self.on(Event::Restart),
+            Input::Restart => {
+                // The network goes on until the reply to M171 has reached its client.
+                Timer::after(GRACE).await;
+                self.on(Event::Restart);
+            }
             Input::List => {
                 if self.house.wifi.idle.load(Ordering::Relaxed)
                     && self.radio.scan(&mut self.heard).await.is_ok()
@@ -332,17 +354,17 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
             Some(Effect::Confirm) => {
                 self.house.wave();
             }
+            Some(Effect::Draw) => self.house.draw_by_button(),
             None => {}
         }
     }
 
-    fn keep_heard(&mut self) {
-        keep_heard(&mut self.heard, &self.house.wifi);
+    fn keep_heard(&self) {
+        keep_heard(&self.heard, &self.house.wifi);
     }
 }
 
-/// Strongest first, and remembered for whoever asks.
-fn keep_heard(heard: &mut Vec<Heard, MAX_HEARD>, wifi: &Wifi) {
-    heard.sort_unstable_by_key(|network| Reverse(network.signal_dbm));
+/// For whoever asks.
+fn keep_heard(heard: &Vec<Heard, MAX_HEARD>, wifi: &Wifi) {
     wifi.heard.lock(|kept| kept.borrow_mut().clone_from(heard));
 }

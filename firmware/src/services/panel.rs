@@ -18,7 +18,7 @@ use protocol_core::settings::StartMode;
 /// How long the light tells that everything could not be forgotten.
 const COMPLAINT: Duration = Duration::from_secs(5);
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 struct Shown {
     /// What the machine does.
     lamp: Lamp,
@@ -55,14 +55,26 @@ impl Panel {
         self.change(|shown| Shown { lamp, ..shown });
     }
 
+    /// What is shown.
+    pub fn lamp(&self) -> Lamp {
+        let shown = self.shown.lock(Cell::get);
+        shown.first.unwrap_or(shown.lamp)
+    }
+
     /// Shows something instead, until it is told `None`.
     pub(super) fn show_first(&self, first: Option<Lamp>) {
         self.change(|shown| Shown { first, ..shown });
     }
 
     fn change(&self, f: impl FnOnce(Shown) -> Shown) {
-        self.shown.lock(|shown| shown.set(f(shown.get())));
-        self.changed.signal(());
+        let differs = self.shown.lock(|shown| {
+            let after = f(shown.get());
+            shown.replace(after) != after
+        });
+        // The same again does not disturb the rhythm.
+        if differs {
+            self.changed.signal(());
+        }
     }
 
     /// The light, for ever. White lasts as long as a press means a factory reset.
@@ -125,6 +137,10 @@ pub async fn watch(house: &House, mut pin: impl Wait + InputPin) -> ! {
 
 async fn act(house: &House, gesture: Gesture) {
     match gesture {
+        // What a person wants first of a machine that is stopped.
+        Gesture::Short if house.arm.resume() => info!("resumed by the button"),
+        // Whatever the network is doing.
+        Gesture::Short if house.drawer.stop() => {}
         Gesture::Short | Gesture::Long => house.wifi.press(gesture),
         Gesture::ResetWarning => house.panel.show_first(Some(Lamp::ResetWarning)),
         Gesture::ResetCancelled => house.panel.show_first(None),

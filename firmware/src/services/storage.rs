@@ -3,12 +3,14 @@
 //! Written only while the arm rests: who asks for a store holds the arm at rest meanwhile.
 
 mod memory;
+mod pages;
 mod parts;
 mod view;
 
 pub use memory::Memory;
 
 use crate::log::warning;
+use core::borrow::BorrowMut;
 use core::cell::{Cell, RefCell};
 use core::fmt;
 use embassy_sync::blocking_mutex;
@@ -151,7 +153,10 @@ impl Store {
     }
 
     /// The storage service: writes what it is given, for ever.
-    pub async fn run<F: NorFlash>(&self, mut memory: Memory<F>) -> ! {
+    ///
+    /// A memory is 2 kB: a chip lends it, or its task would have a few of them on the way in here.
+    pub async fn run<F: NorFlash>(&self, mut memory: impl BorrowMut<Memory<F>>) -> ! {
+        let memory = memory.borrow_mut();
         self.tell(memory.health());
         loop {
             let ticket = self.request.wait().await;
@@ -173,3 +178,7 @@ impl Store {
         self.health.lock(|told| told.set(health));
     }
 }
+
+#[cfg(test)]
+#[cfg(feature = "desktop")]
+mod tests;

@@ -1,6 +1,7 @@
 //! Building, starting and ending the program.
 
 use super::client::Client;
+use super::web::Web;
 use std::io::{BufRead, BufReader};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::path::{Path, PathBuf};
@@ -12,6 +13,8 @@ use std::{env, fs, process, thread};
 
 /// The port of Line-us, which its clients do not let one choose.
 pub const PORT: u16 = 1337;
+/// The port of its page.
+const WEB_PORT: u16 = 8080;
 /// For what takes milliseconds on an idle computer.
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -114,6 +117,8 @@ impl Desktop {
         let mut child = Command::new(binary())
             .arg("--line-us")
             .arg(address.to_string())
+            .arg("--web")
+            .arg(SocketAddr::new(address.ip(), WEB_PORT).to_string())
             .arg("--state")
             .arg(folder.join("state"))
             .arg("--picture")
@@ -152,6 +157,11 @@ impl Desktop {
         self.address
     }
 
+    /// Where its page is.
+    pub fn web(&self) -> Web {
+        Web::at(SocketAddr::new(self.address.ip(), WEB_PORT))
+    }
+
     /// Its picture.
     pub fn picture(&self) -> &Path {
         &self.picture
@@ -174,6 +184,12 @@ impl Desktop {
     pub fn said(&self, text: &str) -> bool {
         let log = self.log.lock().expect("the log's thread lives");
         log.iter().any(|line| line.contains(text))
+    }
+
+    /// How many of the lines that it has printed contain `text`.
+    pub fn count(&self, text: &str) -> usize {
+        let log = self.log.lock().expect("the log's thread lives");
+        log.iter().filter(|line| line.contains(text)).count()
     }
 
     /// Waits until `count` clients have left, as it prints.

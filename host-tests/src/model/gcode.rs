@@ -4,6 +4,8 @@
 pub struct Command {
     pub code: u32,
     words: Vec<(char, f64)>,
+    /// K of a G40: the axes that move as always.
+    pub usual: String,
 }
 
 impl Command {
@@ -19,8 +21,13 @@ impl Command {
 pub fn read(line: &str) -> Result<Option<Command>, String> {
     let text = without_comments(line).to_ascii_uppercase();
     let mut words = Vec::new();
+    let mut usual = String::new();
     for part in text.split_whitespace() {
         let (letter, number) = part.split_at_checked(1).ok_or("not a letter")?;
+        if letter == "K" && words.first() == Some(&('G', 40.0)) && usual.is_empty() {
+            usual = number.to_owned();
+            continue;
+        }
         let value: f64 = number
             .parse()
             .map_err(|_| format!("{part:?} has no number"))?;
@@ -35,7 +42,9 @@ pub fn read(line: &str) -> Result<Option<Command>, String> {
     let (code, allowed) = match words.remove(0) {
         ('G', 0.0) => (0, "XYZF"),
         ('G', 1.0) => (1, "XYZF"),
+        ('G', 4.0) => (4, "PS"),
         ('G', 28.0) => (28, ""),
+        ('G', 40.0) => (40, "XYZ"),
         ('G', 54.0) => (54, "XYS"),
         ('G', 94.0) => (94, "SFP"),
         _ => return Err("not a command the model knows".into()),
@@ -45,7 +54,7 @@ pub fn read(line: &str) -> Result<Option<Command>, String> {
             return Err(format!("{letter} does not belong here, or is repeated"));
         }
     }
-    Ok(Some(Command { code, words }))
+    Ok(Some(Command { code, words, usual }))
 }
 
 fn without_comments(line: &str) -> String {
@@ -66,6 +75,14 @@ fn without_comments(line: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn k_of_a_bare_move_is_a_word() {
+        let command = read("G40 X5 Kxy").unwrap().unwrap();
+        assert_eq!((command.code, command.word('X')), (40, Some(5.0)));
+        assert_eq!(command.usual, "XY");
+        assert!(read("G01 Kxy").is_err());
+    }
 
     #[test]
     fn reads_words_and_skips_comments() {

@@ -2,6 +2,7 @@
 //! not know, or a value out of range, panics and names the line.
 
 use super::arm::{HOME, forward, inverse, pulse};
+use super::paper::Fitting;
 use super::{area, gcode};
 
 /// Time of one step.
@@ -45,17 +46,17 @@ pub fn steps(gcode: &str) -> impl Iterator<Item = Step> + '_ {
 
 /// The set-points at 0, `frame_us`, 2 `frame_us`, ... up to the first at which the last move is complete.
 pub fn frames(gcode: &str, frame_us: u64) -> impl Iterator<Item = Step> + '_ {
-    frames_calibrated(gcode, frame_us, [0.0; 3])
+    frames_fitted(gcode, frame_us, Fitting::NONE)
 }
 
-/// As [`frames`], with degrees (shoulder, elbow, pen) added to the angles before they become pulses.
-pub fn frames_calibrated(
+/// As [`frames`], of an arm that is built like this.
+pub fn frames_fitted(
     gcode: &str,
     frame_us: u64,
-    offsets_deg: [f64; 3],
+    fitting: Fitting,
 ) -> impl Iterator<Item = Step> + '_ {
     assert!(frame_us > 0);
-    let mut moves = Moves::new(gcode);
+    let mut moves = Moves::new(gcode, fitting);
     let mut current = Move::rest(0, 0, HOME);
     let mut time = 0;
     std::iter::from_fn(move || {
@@ -69,7 +70,7 @@ pub fn frames_calibrated(
         if time >= current.end_us() + frame_us {
             return None;
         }
-        let step = current.at(time, offsets_deg);
+        let step = current.at(time, &fitting);
         time += frame_us;
         Some(step)
     })
@@ -77,7 +78,12 @@ pub fn frames_calibrated(
 
 /// One report for each command of a program, the settings G54 and G94 included.
 pub fn reports(gcode: &str) -> impl Iterator<Item = Report> + '_ {
-    Moves::new(gcode).map(|m| {
+    reports_fitted(gcode, Fitting::NONE)
+}
+
+/// As [`reports`], of an arm that is built like this.
+pub fn reports_fitted(gcode: &str, fitting: Fitting) -> impl Iterator<Item = Report> + '_ {
+    Moves::new(gcode, fitting).map(|m| {
         let limited = m.target_limited || m.way_limited();
         Report {
             line: m.line,
@@ -109,6 +115,8 @@ struct Move {
     /// G00: every servo at its own full speed.
     rapid: bool,
     count: u64,
+    /// G4: how long it stays after its steps, of which it has none.
+    dwell_us: u64,
     target_limited: bool,
 }
 
@@ -121,19 +129,20 @@ impl Move {
             to: at,
             rapid: false,
             count: 0,
+            dwell_us: 0,
             target_limited: false,
         }
     }
 
     fn end_us(&self) -> u64 {
-        self.start_us + self.count * STEP_US
+        self.start_us + self.count * STEP_US + self.dwell_us
     }
 
     /// The set-point at a time from the start on; after the end, the target.
     ///
     /// A straight way goes straight from step to step, each of them held at the edge where it lies outside; so between
     /// two of them it can still cut a corner of the area, and is held there as well.
-    fn at(&self, time_us: u64, offsets_deg: [f64; 3]) -> Step {
+    fn at(&self, time_us: u64, fitting: &Fitting) -> Step {
         let since = time_us - self.start_us;
         let (whole, rest) = (since / STEP_US, since % STEP_US);
         let (position, held) = if rest == 0 || whole >= self.count {
@@ -145,8 +154,9 @@ impl Move {
             let (position, held) = inside(between(a, b, rest as f64 / STEP_US as f64));
             (position, held || held_a || held_b)
         };
-        let angles_deg = inverse(position[0], position[1], position[2]);
-        let pulses_us = [0, 1, 2].map(|i| pulse(angles_deg[i] + offsets_deg[i]));
+        let [x, y, z] = fitting.arm(position);
+        let angles_deg = inverse(x, y, z);
+        let pulses_us = fitting.told(position).map(pulse);
         Step {
             line: self.line,
             time_us,
@@ -207,6 +217,7 @@ fn between(a: [f64; 3], b: [f64; 3], part: f64) -> [f64; 3] {
 /// Plans a program, command by command.
 struct Moves<'a> {
     lines: std::iter::Enumerate<std::str::Lines<'a>>,
+    fitting: Fitting,
     time_us: u64,
     position: [f64; 3],
     /// G54: arm = value * scale + offset, for X and Y.
@@ -218,10 +229,11 @@ struct Moves<'a> {
 }
 
 impl<'a> Moves<'a> {
-    fn new(gcode: &'a str) -> Self {
+    fn new(gcode: &'a str, fitting: Fitting) -> Self {
         let lines = gcode.lines().enumerate();
         Moves {
             lines,
+            fitting,
             time_us: 0,
             position: HOME,
             scale: 1.0,
@@ -243,6 +255,25 @@ impl<'a> Moves<'a> {
                     word('Z').unwrap_or(z),
                 ];
                 self.go(line, wanted, command.code == 0)
+            }
+            4 => {
+                let seconds = word('P').or(word('S')).unwrap_or(0.0);
+                let mut dwell = Move::rest(line, self.time_us, self.position);
+                dwell.dwell_us = (seconds * 1e6).round() as u64;
+                dwell
+            }
+            40 => {
+                let [keep_xy, keep_z] = ["XY", "Z"].map(|axes| command.usual == axes);
+                let scaled = |value: f64, axis: usize| match keep_xy {
+                    true => value * self.scale + self.offset[axis],
+                    false => value,
+                };
+                let wanted = [
+                    word('X').map(|v| scaled(v, 0)),
+                    word('Y').map(|v| scaled(v, 1)),
+                    word('Z'),
+                ];
+                self.go_bare(line, wanted, keep_xy, keep_z)
             }
             28 => self.go(line, HOME, false),
             54 => {
@@ -269,6 +300,48 @@ impl<'a> Moves<'a> {
             }
             code => unreachable!("gcode::read let G{code} through"),
         }
+    }
+
+    /// To where the servos are told what those of an exact arm would be told for `wanted`.
+    fn go_bare(&self, line: usize, wanted: [Option<f64>; 3], keep_xy: bool, keep_z: bool) -> Move {
+        let fitting = &self.fitting;
+        let [x, y, z] = wanted;
+        let mut target = [0, 1, 2].map(|i| wanted[i].unwrap_or(self.position[i]));
+        target[2] = target[2].clamp(0.0, 1000.0);
+        let lift = match z {
+            Some(z) if !keep_z => {
+                let told = inverse(1000.0, 1000.0, z.clamp(0.0, 1000.0))[2];
+                Some(1000.0 - (135.0 - (told - fitting.offsets_deg[2])) * 1000.0 / 45.0)
+                    .map(|lift| lift.min(1000.0))
+            }
+            _ => None,
+        };
+        let mut limited = false;
+        if !keep_xy && (x.is_some() || y.is_some()) {
+            let now = forward(fitting.told(self.position));
+            let (far_x, far_y) = (x.unwrap_or(now[0]), y.unwrap_or(now[1]));
+            let (near_x, near_y) = area::closest(far_x, far_y);
+            limited = !area::inside(far_x, far_y);
+            let told = inverse(near_x, near_y, 1000.0);
+            let [x, y, _] = fitting.arm_told(told);
+            // The lift's height and the place depend on each other: as often as it takes.
+            let mut nib = [x, y, target[2]];
+            for _ in 0..20 {
+                let lift = lift.unwrap_or(fitting.arm([nib[0], nib[1], target[2]])[2]);
+                nib = fitting.nib([x, y, lift]);
+            }
+            (target[0], target[1]) = (nib[0], nib[1]);
+        }
+        if let Some(lift) = lift {
+            let (x, y) = area::closest(target[0], target[1]);
+            target[2] = fitting.z(x, y, lift);
+        }
+        if limited && target[2] < PEN_DOWN_BELOW {
+            target[2] = 1000.0;
+        }
+        let mut planned = self.go(line, target, false);
+        planned.target_limited |= limited;
+        planned
     }
 
     fn go(&self, line: usize, wanted: [f64; 3], rapid: bool) -> Move {
@@ -312,6 +385,7 @@ impl<'a> Moves<'a> {
             to,
             rapid,
             count,
+            dwell_us: 0,
             target_limited,
         }
     }

@@ -2,7 +2,8 @@
 
 use crate::scripted::light::{Hue, Pattern};
 use embassy_time::Duration;
-use protocol_core::wifi::{Password, Ssid};
+use protocol_core::settings::{AccessPointName, MachineName, StartMode};
+use protocol_core::wifi::{self, Password, Ssid};
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,10 +17,14 @@ pub enum Command {
 /// What the script does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
-    PowerOn { held: bool },
+    PowerOn {
+        held: bool,
+    },
     CutThePower,
     PowerFailsAfter(u32),
     Memory(Memory),
+    /// Something is remembered already.
+    Remember(Kept),
     Press,
     Hold(Duration),
     Button(bool),
@@ -31,6 +36,21 @@ pub enum Action {
     ComputerLeaves,
     Client(char, ClientAction),
     Wait(Duration),
+}
+
+/// What a machine may remember that was told it before the scenario begins.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kept {
+    /// A network.
+    Network(wifi::Network),
+    /// M550.
+    Name(MachineName),
+    /// M552 S.
+    Start(StartMode),
+    /// M552 P.
+    AccessPoint(AccessPointName),
+    /// M291.
+    Waves(bool),
 }
 
 /// What becomes of the memory.
@@ -70,18 +90,25 @@ pub enum Expectation {
     Light(Pattern),
     LightStays(Pattern, Duration),
     LightWasNever(Hue),
-    Opens(Ssid),
+    Opens(Ssid, Option<Password>),
     ClosesItsNetwork,
     Tries(Ssid, Outcome),
     MayTry(Ssid),
     TriesNothing(Duration),
+    /// By this name, without `.local`; by none.
+    IsFound(Option<String>),
     Remembers(Remembered),
     PowerIsOff,
     ArmWaves,
     ArmRests(Option<[i32; 3]>),
     ArmStays(Duration),
-    Pen { down: bool },
-    PenStays { down: bool, time: Duration },
+    Pen {
+        down: bool,
+    },
+    PenStays {
+        down: bool,
+        time: Duration,
+    },
     NibPasses(f64, f64, Option<f64>),
 }
 

@@ -54,7 +54,7 @@ pub fn play(name: &str, text: &str) -> Result<(), Box<Failure>> {
     let Some((values, rest)) = values(text) else {
         return play_once(name, text);
     };
-    let (variable, first, last) = values.map_err(|why| {
+    let (variable, values) = values.map_err(|why| {
         let line = text.lines().position(is_command).unwrap_or(0);
         Box::new(Failure {
             scenario: name.into(),
@@ -64,8 +64,8 @@ pub fn play(name: &str, text: &str) -> Result<(), Box<Failure>> {
             journal: Vec::new(),
         })
     })?;
-    (first..=last).try_for_each(|value| {
-        let played = rest.replace(&format!("<{variable}>"), &value.to_string());
+    values.iter().try_for_each(|value| {
+        let played = rest.replace(&format!("<{variable}>"), value);
         play_once(&format!("{name} ({variable} = {value})"), &played)
     })
 }
@@ -75,9 +75,9 @@ fn is_command(line: &str) -> bool {
     !line.is_empty() && !line.starts_with('#')
 }
 
-type Values = Result<(String, u32, u32), String>;
+type Values = Result<(String, Vec<String>), String>;
 
-/// Reads `for each N from 1 to 9`, if it is the first line, and gives the text with that line blank.
+/// Reads `for each N from 1 to 9` or `for each N in 0.5 2`, if it is the first line, and gives the text with that line blank.
 fn values(text: &str) -> Option<(Values, String)> {
     let line = text.lines().find(|line| is_command(line))?;
     let mut words = words::Words::new(line);
@@ -86,16 +86,21 @@ fn values(text: &str) -> Option<(Values, String)> {
     }
     let mut read = || {
         let variable = words.next_word().ok_or("a name is missing")?.to_owned();
-        if !words.eat("from") {
-            return Err("'from' is missing".to_owned());
+        if words.eat("in") {
+            let values = words.rest().split_whitespace().map(str::to_owned);
+            return Ok((variable, values.collect()));
         }
-        let first = words.number()?;
+        if !words.eat("from") {
+            return Err("'from' or 'in' is missing".to_owned());
+        }
+        let first: u32 = words.number()?;
         if !words.eat("to") {
             return Err("'to' is missing".to_owned());
         }
         let last = words.number()?;
         words.end()?;
-        Ok((variable, first, last))
+        let values = (first..=last).map(|value| value.to_string());
+        Ok((variable, values.collect()))
     };
     Some((read(), text.replacen(line, "", 1)))
 }

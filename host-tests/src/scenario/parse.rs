@@ -1,13 +1,14 @@
 //! A line of a scenario becomes a typed command here.
 
 use super::command::{
-    Action, ClientAction, ClientExpectation, Command, Expectation, Memory, Network, Outcome,
+    Action, ClientAction, ClientExpectation, Command, Expectation, Kept, Memory, Network, Outcome,
     Remembered,
 };
 use super::words::Words;
 use crate::scripted::light::{Hue, Pattern};
 use embassy_time::Duration;
-use protocol_core::wifi::{Password, Ssid};
+use protocol_core::settings::{AccessPointName, MachineName, StartMode};
+use protocol_core::wifi::{self, Password, Ssid};
 
 /// Reads a line that is no comment.
 pub fn parse(line: &str) -> Result<Command, String> {
@@ -47,6 +48,8 @@ fn action(words: &mut Words<'_>) -> Found<Action> {
             return Err("the power fails after a number of bytes".into());
         }
         Action::PowerFailsAfter(bytes)
+    } else if words.eat("memory holds") {
+        Action::Remember(kept(words)?)
     } else if words.eat("memory is") {
         Action::Memory(memory(words)?)
     } else if words.eat("press the button") {
@@ -91,6 +94,30 @@ fn memory(words: &mut Words<'_>) -> Result<Memory, String> {
         }
     }
     Err("the memory is empty, garbage, worn out or well".into())
+}
+
+fn kept(words: &mut Words<'_>) -> Result<Kept, String> {
+    Ok(if words.eat("network") {
+        let ssid = ssid(words)?;
+        let password = words.eat("password").then(|| password(words)).transpose()?;
+        Kept::Network(wifi::Network { ssid, password })
+    } else if words.eat("name") {
+        let name = words.next_word().and_then(MachineName::new);
+        Kept::Name(name.ok_or("a name is 1 to 32 letters, digits and inner hyphens")?)
+    } else if words.eat("start mode") {
+        let mode = StartMode::from_number(words.number()?);
+        Kept::Start(mode.ok_or("a start mode is 1 to 4")?)
+    } else if words.eat("access point name") {
+        let name = AccessPointName::from_number(words.number()?);
+        Kept::AccessPoint(name.ok_or("1 is Line-us-Setup, 2 the machine's name")?)
+    } else if words.eat("no waves") {
+        Kept::Waves(false)
+    } else {
+        return Err(
+            "the memory holds a network, a name, a start mode, an access point name or no waves"
+                .into(),
+        );
+    })
 }
 
 fn network(words: &mut Words<'_>) -> Result<Network, String> {
@@ -208,13 +235,20 @@ fn expectation(words: &mut Words<'_>) -> Found<Expectation> {
 
 fn machine(words: &mut Words<'_>) -> Result<Expectation, String> {
     Ok(if words.eat("opens") {
-        Expectation::Opens(ssid(words)?)
+        let ssid = ssid(words)?;
+        let password = words.eat("password").then(|| password(words)).transpose()?;
+        Expectation::Opens(ssid, password)
     } else if words.eat("closes its network") {
         Expectation::ClosesItsNetwork
     } else if words.eat("joins") {
         Expectation::Tries(ssid(words)?, Outcome::Joined)
     } else if words.eat("does not find") {
         Expectation::Tries(ssid(words)?, Outcome::NotFound)
+    } else if words.eat("is found as") {
+        let host = words.text()?;
+        Expectation::IsFound(Some(String::from_utf8_lossy(&host).into_owned()))
+    } else if words.eat("is not found") {
+        Expectation::IsFound(None)
     } else if words.eat("is refused by") {
         Expectation::Tries(ssid(words)?, Outcome::Refused)
     } else if words.eat("fails to join") {

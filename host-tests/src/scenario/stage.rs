@@ -1,11 +1,11 @@
 //! Where a scenario is played: the board, the computer with its clients, and time.
 
 use super::client::Client;
-use super::command::{Action, ClientAction, Memory, Network};
+use super::command::{Action, ClientAction, Kept, Memory, Network};
 use crate::scripted::Board;
 use crate::scripted::journal::note;
 use crate::scripted::light::{Hue, Pattern};
-use crate::scripted::radio::shown;
+use crate::scripted::radio::{offered, shown};
 use embassy_time::{Duration, Instant};
 use firmware::boards::scripted_radio::OnAir;
 use protocol_core::wifi::Ssid;
@@ -155,6 +155,16 @@ impl Stage {
                 self.looked = None;
             }
             Action::PowerFailsAfter(bytes) => self.board.cells.borrow_mut().fail_after(*bytes),
+            Action::Remember(kept) => self.board.remember(|settings| match kept {
+                Kept::Network(network) => {
+                    let put = settings.networks.put(network.clone());
+                    put.expect("a scenario does not fill the memory like this");
+                }
+                Kept::Name(name) => settings.name = name.clone(),
+                Kept::Start(mode) => settings.start = *mode,
+                Kept::AccessPoint(name) => settings.access_point = *name,
+                Kept::Waves(on) => settings.waves = *on,
+            }),
             Action::Memory(memory) => {
                 let mut cells = self.board.cells.borrow_mut();
                 match memory {
@@ -260,8 +270,8 @@ impl Stage {
             return Some(left_over);
         }
         let opened = self.board.radio.opened.borrow();
-        if let Some(ssid) = opened.front() {
-            return Some(format!("the machine opens {}", shown(ssid)));
+        if let Some(own) = opened.front() {
+            return Some(format!("the machine opens {}", offered(own)));
         }
         let tries = self.board.radio.tries.borrow();
         if let Some((ssid, outcome)) = tries.front() {

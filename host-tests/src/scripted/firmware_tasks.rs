@@ -2,18 +2,22 @@
 
 use super::arm::Servos;
 use super::button::Button;
-use super::flash::{Cells, Flash, SIZE};
+use super::flash::{Cells, Flash, SETTINGS, SIZE};
 use super::light::Light;
 use super::power::Power;
-use super::radio::{RecordedAddress, RecordedRadio};
+use super::quiet::Quiet;
+use super::radio::{RadioRecord, RecordedAddress, RecordedRadio};
 use super::tcp::Acceptor;
 use super::{Board, FRAME};
 use firmware::board::Vitals;
+use firmware::boards::scripted_radio::Air;
 use firmware::services::House;
 use firmware::services::arm::TimedFrames;
-use firmware::services::line_us::Server;
+use firmware::services::discovery::{self, Ports};
+use firmware::services::drawings::Album;
+use firmware::services::line_us::{PORT, Server};
 use firmware::services::storage::Memory;
-use firmware::services::{network, panel};
+use firmware::services::{drawer, network, panel};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client};
 use protocol_core::settings::Settings;
@@ -26,30 +30,31 @@ const IDENTITY: Identity = Identity {
 };
 
 fn memory(flash: Flash) -> Memory<Flash> {
-    Memory::new(flash, 0..SIZE).expect("whole pages, at least two of them")
+    Memory::new(flash, 0..SETTINGS).expect("whole pages, at least two of them")
+}
+
+fn album(flash: Flash) -> Album<Flash> {
+    Album::new(flash, SETTINGS..SIZE).expect("whole pages")
 }
 
 /// Starts everything, as the programs of the other boards do.
 pub fn start(board: &Board, reason: &'static str) {
-    let moving = {
-        let house = board.house.clone();
-        move || {
-            let house = house.borrow();
-            let house: Option<&Rc<House>> = house.as_ref();
-            house.is_some_and(|house| house.arm.with(|arm| arm.next_event().is_some()))
-        }
-    };
-    let flash = Flash {
+    let place = board.house.clone();
+    let moves = |house: &Rc<House>| house.arm.with(|arm| arm.next_event().is_some());
+    let moving = move || place.borrow().as_ref().is_some_and(moves);
+    let moving: Rc<dyn Fn() -> bool> = Rc::new(moving);
+    let flash = || Flash {
         cells: board.cells.clone(),
         power: board.power.clone(),
-        moving: Rc::new(moving),
+        moving: moving.clone(),
     };
+    let (mut memory, mut album) = (memory(flash()), album(flash()));
     let devices = Devices::of(board);
     let spawner = board.tasks.spawner();
     let place = board.house.clone();
     board.tasks.spawner().spawn(async move {
-        let mut memory = memory(flash);
         let (settings, _) = memory.load().await;
+        album.open().await;
         let vitals = Vitals {
             free_memory: || 100_000,
             reset_reason: reason,
@@ -72,6 +77,15 @@ pub fn start(board: &Board, reason: &'static str) {
         spawner.spawn(async move { panel::watch(&served, devices.button).await });
         let served = house.clone();
         spawner.spawn(async move { network::run(&served, devices.radio, devices.address).await });
+        let served = house.clone();
+        spawner.spawn(async move {
+            let ports = Ports {
+                line_us: PORT,
+                web: None,
+            };
+            let address = || devices.network.address(&devices.air);
+            discovery::run(&served, &Quiet, address, ports).await
+        });
         let server = Rc::new(Server::new());
         let acceptor = Rc::new(devices.acceptor);
         for client in (0..).map_while(Client::new) {
@@ -79,6 +93,9 @@ pub fn start(board: &Board, reason: &'static str) {
             spawner.spawn(async move { server.work(&*acceptor, client, &served).await });
         }
         spawner.spawn(async move { server.turn_away(&*acceptor).await });
+        let served = house.clone();
+        spawner.spawn(async move { served.drawings.run(album).await });
+        spawner.spawn(async move { drawer::run(&house).await });
     });
 }
 
@@ -88,6 +105,8 @@ struct Devices {
     button: Button,
     radio: RecordedRadio,
     address: RecordedAddress,
+    network: Rc<RadioRecord>,
+    air: Rc<Air>,
     acceptor: Acceptor,
 }
 
@@ -107,6 +126,8 @@ impl Devices {
             button: Button::new(board.button.clone()),
             radio: RecordedRadio::new(board.air.clone(), board.radio.clone(), power()),
             address: RecordedAddress(board.radio.clone()),
+            network: board.radio.clone(),
+            air: board.air.clone(),
             acceptor: Acceptor {
                 port: board.port.clone(),
                 power: power(),
@@ -117,10 +138,26 @@ impl Devices {
 
 /// What a start would find in these cells, which stay as they are.
 pub fn remembered(cells: &Cells) -> Settings {
-    let flash = Flash {
-        cells: Rc::new(RefCell::new(cells.clone())),
+    let copy = Rc::new(RefCell::new(cells.clone()));
+    embassy_futures::block_on(at_rest(&copy).load()).0
+}
+
+/// Changes what these cells hold.
+pub fn remember(cells: &Rc<RefCell<Cells>>, change: impl FnOnce(&mut Settings)) {
+    let mut memory = at_rest(cells);
+    embassy_futures::block_on(async {
+        let (mut settings, _) = memory.load().await;
+        change(&mut settings);
+        let stored = memory.store(&settings).await;
+        stored.expect("the memory is well where a scenario begins");
+    });
+}
+
+/// The memory in these cells, without the machine.
+fn at_rest(cells: &Rc<RefCell<Cells>>) -> Memory<Flash> {
+    memory(Flash {
+        cells: cells.clone(),
         power: Power::present(),
         moving: Rc::new(|| false),
-    };
-    embassy_futures::block_on(memory(flash).load()).0
+    })
 }

@@ -10,8 +10,10 @@ use std::cell::RefCell;
 use std::future::pending;
 use std::rc::Rc;
 
-/// Bytes of the flash, all for settings, as many as the boards have for them.
-pub const SIZE: u32 = 8 * 4096;
+/// Bytes for settings, as many as the boards have for them.
+pub const SETTINGS: u32 = 8 * 4096;
+/// Bytes for settings and then drawings, as many as the boards have for those.
+pub const SIZE: u32 = SETTINGS + 360 * 4096;
 
 /// The cells, with or without power.
 #[derive(Clone, Debug)]

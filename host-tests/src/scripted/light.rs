@@ -121,17 +121,25 @@ impl LightRecord {
         if now - *began >= STEADY {
             return Some(Pattern::Steady(*hue));
         }
-        let [.., (a, first), (b, other), (c, third)] = changes.as_slice() else {
+        // How long the last ones lasted, backwards: the colour before this one first.
+        let mut lasted = [Duration::MIN; 3];
+        let pairs = changes.iter().rev().zip(changes.iter().rev().skip(1));
+        let known = lasted.iter_mut().zip(pairs);
+        let known = known
+            .map(|(lasted, ((end, _), (begin, _)))| *lasted = *end - *begin)
+            .count();
+        let [.., (_, first), (_, other), _] = changes.as_slice() else {
             return None;
         };
-        // The last two were equally long, and this one is not longer.
-        let (one, two) = (*b - *a, *c - *b);
-        let tolerance = one / 5;
-        let regular = one <= two + tolerance && two <= one + tolerance;
-        if first != third || !regular || now - *c > one + tolerance {
+        let like = |a: Duration, b: Duration| a <= b + b / 5 && b <= a + a / 5;
+        let [last, before, earlier] = lasted;
+        // Of the colour that it has now, the last time is known; either both colours last equally long,
+        // or the other one did so twice.
+        let regular = like(last, before) || (known == 3 && like(last, earlier));
+        if hue != first || !regular || now - *began > before + before / 5 {
             return None;
         }
-        Some(Pattern::in_turn(*first, *other, one + two <= FAST))
+        Some(Pattern::in_turn(*hue, *other, last + before <= FAST))
     }
 
     /// Whether it has been `hue` at any time since `then`.
@@ -207,6 +215,14 @@ mod tests {
             (&[("red", 500), ("dark", 500), ("red", 700)], "?"),
             (&[("red", 500), ("dark", 500)], "?"),
             (&[("red", 500), ("dark", 100), ("red", 0)], "?"),
+            (
+                &[("dark", 100), ("red", 500), ("dark", 100), ("red", 0)],
+                "red flashing",
+            ),
+            (
+                &[("dark", 200), ("red", 500), ("dark", 100), ("red", 0)],
+                "?",
+            ),
             (&[("red", 500), ("dark", 500), ("blue", 0)], "?"),
             (
                 &[("red", 250), ("dark", 250), ("red", 0)],

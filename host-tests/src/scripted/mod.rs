@@ -8,6 +8,7 @@ pub mod flash;
 pub mod journal;
 pub mod light;
 pub mod power;
+pub mod quiet;
 pub mod radio;
 pub mod tasks;
 pub mod tcp;
@@ -37,7 +38,6 @@ const POLLS_AT_MOST: usize = 200_000;
 
 /// The devices, and the firmware while there is power.
 pub struct Board {
-    time: HandTime,
     /// Supply, and what has gone wrong with the firmware.
     pub power: Power,
     /// What is in the air.
@@ -56,13 +56,21 @@ pub struct Board {
     pub port: Rc<Port>,
     house: Rc<RefCell<Option<Rc<House>>>>,
     tasks: Tasks,
+    /// The last to go.
+    time: HandTime,
 }
 
 impl Board {
+    /// The name under which the machine is found, without `.local`.
+    pub fn found_as(&self) -> Option<String> {
+        let house = self.house.borrow();
+        let host = house.as_ref()?.discovery.host()?;
+        Some(host.as_str().into())
+    }
+
     /// A new machine in its box: nothing stored, no power. Time begins at 0, and belongs to this thread.
     pub fn new() -> Self {
         Self {
-            time: HandTime::take(),
             power: Power::default(),
             air: Rc::new(Air::new(Pace::LIFELIKE)),
             radio: Rc::default(),
@@ -73,6 +81,7 @@ impl Board {
             port: Rc::default(),
             house: Rc::default(),
             tasks: Tasks::default(),
+            time: HandTime::take(),
         }
     }
 
@@ -89,6 +98,7 @@ impl Board {
             self.power.switch(false);
         }
         self.tasks = Tasks::default();
+        self.time.forget_alarms();
         self.house.take();
         self.port.power_off();
         self.arm.power_off();
@@ -108,7 +118,7 @@ impl Board {
                 return false;
             }
         }
-        if !self.power.is_on() && self.house.borrow().is_some() {
+        if !self.power.is_on() && !self.tasks.is_empty() {
             // It failed by itself.
             self.cut_the_power();
         }
@@ -142,6 +152,11 @@ impl Board {
             .is_some_and(|house| house.arm.with(|arm| arm.is_busy()))
     }
 
+    /// Has the machine remember something, as if it had been told before.
+    pub fn remember(&mut self, change: impl FnOnce(&mut Settings)) {
+        firmware_tasks::remember(&self.cells, change);
+    }
+
     /// What a restart would find in memory.
     pub fn remembered(&self) -> Settings {
         firmware_tasks::remembered(&self.cells.borrow())
@@ -151,5 +166,42 @@ impl Board {
 impl Default for Board {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_futures::yield_now;
+
+    #[test]
+    fn a_firmware_that_runs_in_circles_is_told() {
+        let mut board = Board::new();
+        board.power_on("a test");
+        board.settle();
+        assert_eq!(board.power.offence(), None);
+        board.tasks.spawner().spawn(async {
+            loop {
+                yield_now().await;
+            }
+        });
+        board.settle();
+        let offence = board.power.offence().unwrap();
+        assert!(offence.contains("runs in circles"), "{offence}");
+    }
+
+    #[test]
+    fn power_cycles_leave_nothing_behind() {
+        let mut board = Board::new();
+        for _ in 0..100 {
+            board.power_on("a test");
+            board.settle();
+        }
+        assert_eq!(board.power.offence(), None);
+        board.cut_the_power();
+        assert_eq!(board.time.next_alarm(), None);
+        assert!(board.house.borrow().is_none());
+        assert_eq!((board.air.own(), board.air.joined()), (None, None));
+        assert_eq!(Rc::strong_count(&board.port), 1);
     }
 }

@@ -3,8 +3,10 @@
 
 use super::journal::note;
 use super::power::Power;
+use core::net::Ipv4Addr;
 use firmware::board::{Address, Radio, RadioFault};
 use firmware::boards::scripted_radio::{Air, ScriptedRadio};
+use firmware::services::dhcp::OWN_ADDRESS;
 use heapless::Vec;
 use protocol_core::wifi::{Heard, Joined, Network, Ssid};
 use std::cell::{Cell, RefCell};
@@ -18,16 +20,39 @@ pub struct RadioRecord {
     /// Networks that were tried, and how that ended.
     pub tries: RefCell<VecDeque<(Ssid, Joined)>>,
     /// Access points that were opened.
-    pub opened: RefCell<VecDeque<Ssid>>,
+    pub opened: RefCell<VecDeque<Network>>,
     /// The machine has asked the joined network for an address.
     pub asked: Cell<bool>,
     /// The machine gives its guests addresses.
     pub serving: Cell<bool>,
 }
 
+impl RadioRecord {
+    /// The machine's address in this air.
+    pub fn address(&self, air: &Air) -> Option<Ipv4Addr> {
+        let given = self.asked.get() && air.joined().is_some();
+        match self.serving.get() {
+            true => Some(OWN_ADDRESS),
+            false => given.then_some(Ipv4Addr::new(10, 0, 0, 2)),
+        }
+    }
+}
+
 /// A network's name as a script writes it.
 pub fn shown(ssid: &Ssid) -> String {
     format!("\"{}\"", ssid.as_bytes().escape_ascii())
+}
+
+/// A network that the machine offers as a script writes it.
+pub fn offered(network: &Network) -> String {
+    let name = shown(&network.ssid);
+    match &network.password {
+        None => name,
+        Some(password) => {
+            let password = password.as_bytes().escape_ascii();
+            format!("{name}, password \"{password}\"")
+        }
+    }
 }
 
 /// The radio of the board.
@@ -84,9 +109,9 @@ impl Radio for RecordedRadio {
         let outcome = self.inner.open_access_point(network).await;
         match outcome {
             Ok(()) => {
-                note(format_args!("    radio: opens {name}"));
+                note(format_args!("    radio: opens {}", offered(network)));
                 let mut opened = self.record.opened.borrow_mut();
-                opened.push_back(network.ssid.clone());
+                opened.push_back(network.clone());
             }
             Err(RadioFault) => note(format_args!("    radio: fails to open {name}")),
         }

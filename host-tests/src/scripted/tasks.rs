@@ -59,6 +59,11 @@ impl Tasks {
         self.spawner.clone()
     }
 
+    /// Whether there is none, nor one to come.
+    pub fn is_empty(&self) -> bool {
+        self.tasks.is_empty() && self.spawner.0.borrow().is_empty()
+    }
+
     /// Polls a task that is ready; `false` when none is.
     pub fn poll_one(&mut self) -> bool {
         for work in self.spawner.0.take() {

@@ -168,6 +168,12 @@ impl TcpShutdown for Socket {
     async fn close(&mut self, what: Close) -> Result<(), Gone> {
         if what != Close::Read {
             self.0.wire.borrow_mut().machine_finishes = true;
+            self.0
+                .until(|wire| match wire.broken() {
+                    Some(end) => Some(Err(Gone(end))),
+                    None => wire.outgoing.is_empty().then_some(Ok(())),
+                })
+                .await?;
         }
         if what != Close::Write {
             while self.0.read(&mut [0; 64]).await? > 0 {}
@@ -244,7 +250,7 @@ impl Readable for Stream {
 impl Write for Stream {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Gone> {
         self.until(|wire| {
-            if let Some(end @ (End::Reset | End::Lost)) = wire.machine_sees {
+            if let Some(end) = wire.broken() {
                 return Some(Err(Gone(end)));
             }
             if wire.machine_finishes {

@@ -72,6 +72,11 @@ impl Wire {
         }
     }
 
+    /// Whether the machine can write to it no more, and why.
+    pub fn broken(&self) -> Option<End> {
+        self.machine_sees.filter(|end| *end != End::Closed)
+    }
+
     /// Room for what the machine writes.
     pub fn room(&self) -> usize {
         WINDOW - self.outgoing.len().min(WINDOW)

@@ -121,6 +121,10 @@ pub const EDGE_CASES: &[(&str, &str)] = &[
         "G01 X1100\nG54 X50\nG01 X1100\nG01 Y900\nG54 S2\nG01 X500 Z0\nG54 X0 Y0 S1\nG28",
     ),
     (
+        "dwells",
+        "G4 P0.25\nG01 X1100 Z0\nG4 S0.03\nG04 P0\nG01 X1105\nG4 P0.0123\nG01 X1000 Z1000\nG4 P0.5",
+    ),
+    (
         "as clients write it",
         "g01 x900 y300 z1\nG1 X900.0000 Y999.9999999\nG01  X1000  Y1.5e-07 \nG0 Z1E3\nG01 X+1200 Y-.5 F5000 ; home\nG28 ",
     ),
@@ -132,4 +136,26 @@ pub const DECIMAL_STEPS: &[&str] = &[
     "G01 Z0\nG94 S1.3\nG01 X1003.9",
     "G94 P14.7\nG01 X1044.1\nG01 X1000\nG01 Y985.3",
     "G54 S1.1\nG94 P3.3\nG01 X900\nG01 X909",
+];
+
+/// Moves without scale, origin and calibration. No way is a whole number of steps: where offsets are taken off the
+/// angles and put back, a unit in the last place would make one more.
+pub const BARE_MOVES: &[(&str, &str)] = &[
+    (
+        "all axes",
+        "G40 X1400 Y-300 Z700\nG40 X1200 Y605 Z0\nG40 X1000 Y1000 Z1000\nG01 X1100 Z0\nG40 X1100 Y1000 Z500",
+    ),
+    (
+        "what is left out stays",
+        "G40 X1400 Y-300 Z700\nG40 Y203\nG40 X1502\nG40 Z103\nG40\nG01 Z0\nG40 X1450",
+    ),
+    (
+        "scale and origin, and not",
+        "G54 X100 Y-50 S2\nG40 X1300 Y405 Z610\nG01 X600 Y200 Z0\nG40 X600 Y200 Z303 Kxy\nG40 X1300 Y302 Z301 Kz\n\
+         G40 Z2 Kz\nG40 X652 Kxy",
+    ),
+    (
+        "out of reach",
+        "G01 Z0\nG40 X3000 Y0\nG40 X1503 Y0 Z2000\nG40 X1501 Y0 Z-20\nG40 X0 Y0 Z800\nG40 X2500 Y100 Z100 Kxy",
+    ),
 ];

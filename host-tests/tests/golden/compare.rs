@@ -1,7 +1,7 @@
 //! A program through the core and through the model, compared step by step.
 
 use host_tests::bench::{Answer, Bench};
-use host_tests::model::{self, Step};
+use host_tests::model::{self, Fitting, Step};
 use protocol_core::arm::{Angles, Calibration};
 use protocol_core::machine::{Report, SetPoint};
 use protocol_core::motion::{Microdegrees, Position};
@@ -13,22 +13,40 @@ const PULSE_TOLERANCE: f64 = 0.1;
 
 /// Set-points and replies of the core, against the model; gives how many set-points there are.
 pub fn against_model(name: &str, program: &str, frame_us: u64) -> Result<usize, String> {
-    programs(name, program, program, frame_us, [0.0; 3])
+    programs(name, program, program, frame_us, Fitting::NONE)
 }
 
-/// The same with servos that stand off by some degrees.
-pub fn calibrated_against_model(
+/// The same of an arm that is not exact.
+pub fn fitted_against_model(
     name: &str,
     program: &str,
     frame_us: u64,
-    offsets: [f64; 3],
+    fitting: Fitting,
 ) -> Result<usize, String> {
-    let microdegrees = offsets.map(|offset| Microdegrees::new((offset * 1e6) as i32));
+    compare(
+        bench(frame_us, &fitting),
+        name,
+        program,
+        program,
+        frame_us,
+        fitting,
+    )
+}
+
+fn bench(frame_us: u64, fitting: &Fitting) -> Bench {
+    let microdegrees = fitting
+        .offsets_deg
+        .map(|offset| Microdegrees::new((offset * 1e6) as i32));
     let calibration = Calibration {
         offsets: Angles::from_array(microdegrees),
     };
-    let bench = Bench::new(frame_us, calibration);
-    compare(bench, name, program, program, frame_us, offsets)
+    let mut bench = Bench::new(frame_us, calibration);
+    if (fitting.map, fitting.shift_mm) != (Fitting::NONE.map, Fitting::NONE.shift_mm) {
+        let [a, b, c, d] = fitting.map;
+        let answer = bench.say(0, &format!("G31 S{a};{b};{c};{d} P{}", fitting.shift_mm));
+        assert_eq!(answer.text(), "ok ");
+    }
+    bench
 }
 
 /// The core draws one program, the model another: for the test of this comparison itself.
@@ -37,10 +55,16 @@ pub fn programs(
     core: &str,
     model: &str,
     frame_us: u64,
-    offsets: [f64; 3],
+    fitting: Fitting,
 ) -> Result<usize, String> {
-    let bench = Bench::new(frame_us, Calibration::default());
-    compare(bench, name, core, model, frame_us, offsets)
+    compare(
+        bench(frame_us, &Fitting::NONE),
+        name,
+        core,
+        model,
+        frame_us,
+        fitting,
+    )
 }
 
 fn compare(
@@ -49,9 +73,9 @@ fn compare(
     core: &str,
     model: &str,
     frame_us: u64,
-    offsets: [f64; 3],
+    fitting: Fitting,
 ) -> Result<usize, String> {
-    let mut reports = model::reports(model);
+    let mut reports = model::reports_fitted(model, fitting);
     let mut begun_us = 0;
     let mut lines = 0;
     for (number, line) in (1..).zip(core.lines()) {
@@ -76,7 +100,7 @@ fn compare(
     }
     bench.rest();
 
-    let expected: Vec<Step> = model::frames_calibrated(model, frame_us, offsets).collect();
+    let expected: Vec<Step> = model::frames_fitted(model, frame_us, fitting).collect();
     for (index, step) in expected.iter().enumerate() {
         let at = || {
             let line = model.lines().nth(step.line.wrapping_sub(1)).unwrap_or("");

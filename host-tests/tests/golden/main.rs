@@ -4,8 +4,9 @@
 mod cases;
 mod compare;
 
-use cases::{DECIMAL_STEPS, EDGE_CASES};
-use compare::{against_model, calibrated_against_model};
+use cases::{BARE_MOVES, DECIMAL_STEPS, EDGE_CASES};
+use compare::{against_model, fitted_against_model};
+use host_tests::model::Fitting;
 use std::path::{Path, PathBuf};
 
 /// A frame that no step is a multiple of.
@@ -99,8 +100,72 @@ fn a_calibration_is_added_to_the_angles() {
         [100.0, -100.0, 60.0],
     ] {
         for (name, text) in EDGE_CASES {
-            calibrated_against_model(name, text, 10_000, offsets)
+            let fitting = Fitting {
+                offsets_deg: offsets,
+                ..Fitting::NONE
+            };
+            fitted_against_model(name, text, 10_000, fitting)
                 .unwrap_or_else(|off| panic!("offsets {offsets:?}: {off}"));
+        }
+    }
+}
+
+/// Paper and lift of arms that are not exact.
+const FITTINGS: [Fitting; 5] = [
+    Fitting {
+        map: [0.0, 100.0, 300.0, 200.0],
+        ..Fitting::NONE
+    },
+    Fitting {
+        map: [-500.0, 500.0, -500.0, 500.0],
+        ..Fitting::NONE
+    },
+    Fitting {
+        shift_mm: 0.85,
+        ..Fitting::NONE
+    },
+    Fitting {
+        map: [120.0, -40.0, 0.0, 333.0],
+        shift_mm: -2.0,
+        ..Fitting::NONE
+    },
+    Fitting {
+        offsets_deg: [3.5, -2.25, 1.5],
+        map: [0.0, 100.0, 300.0, 200.0],
+        shift_mm: 2.0,
+    },
+];
+
+#[test]
+fn paper_and_lift_are_compensated_as_the_model_says() {
+    let mut off = Vec::new();
+    for fitting in FITTINGS {
+        for (name, text) in EDGE_CASES {
+            if let Err(why) = fitted_against_model(name, text, ODD_FRAME_US, fitting) {
+                off.push(format!("{fitting:?}: {why}"));
+            }
+        }
+    }
+    assert!(off.is_empty(), "{} cases:\n{}", off.len(), off.join("\n"));
+}
+
+#[test]
+fn examples_on_uneven_paper_with_a_crooked_lift() {
+    for (path, text) in examples() {
+        let name = path.to_string_lossy();
+        for fitting in FITTINGS {
+            fitted_against_model(&name, &text, 10_000, fitting)
+                .unwrap_or_else(|off| panic!("{fitting:?}: {off}"));
+        }
+    }
+}
+
+#[test]
+fn bare_moves_go_where_the_model_says() {
+    for fitting in FITTINGS.into_iter().chain([Fitting::NONE]) {
+        for (name, text) in BARE_MOVES {
+            fitted_against_model(name, text, 10_000, fitting)
+                .unwrap_or_else(|off| panic!("{fitting:?}: {off}"));
         }
     }
 }
@@ -116,9 +181,33 @@ fn the_comparison_notices_what_is_wrong() {
         ("G01 X1100 Z0.02\nG01 X1200", "Z"),
         ("G01 X1100 Z0\nG94 S6\nG01 X1200", "replies"),
     ] {
-        let off = compare("base", other, base, 10_000, [0.0; 3]).expect_err(other);
+        let off = compare("base", other, base, 10_000, Fitting::NONE).expect_err(other);
         assert!(off.contains(what), "{other}: {off}");
     }
-    let off = compare("base", base, base, 10_000, [0.02, 0.0, 0.0]).expect_err("offset");
-    assert!(off.contains("shoulder"), "{off}");
+    for (fitting, what) in [
+        (
+            Fitting {
+                offsets_deg: [0.02, 0.0, 0.0],
+                ..Fitting::NONE
+            },
+            "shoulder",
+        ),
+        (
+            Fitting {
+                map: [1.0; 4],
+                ..Fitting::NONE
+            },
+            "pen",
+        ),
+        (
+            Fitting {
+                shift_mm: 0.05,
+                ..Fitting::NONE
+            },
+            "shoulder",
+        ),
+    ] {
+        let off = compare("base", base, base, 10_000, fitting).expect_err(what);
+        assert!(off.contains(what), "{fitting:?}: {off}");
+    }
 }

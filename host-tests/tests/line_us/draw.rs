@@ -35,6 +35,24 @@ fn the_summary_tells_what_was_drawn() {
 }
 
 #[test]
+fn the_picture_knows_paper_and_lift() {
+    // The arm goes to and fro below the nib, which stays over its place: the lengths are those of a vertical lift.
+    let run = draw_text(
+        "G31 S0;100;300;200 P1.2\nG01 Z0\nG01 X1200\nG01 Z1000\nG01 X900\nG01 Z0\nG01 Y800\nG01 Z1000\n",
+        &[],
+    );
+    assert_eq!(run.status, 0, "{}", run.stderr);
+    for (field, value) in [
+        ("strokes", "2"),
+        ("pen down", "20.0 mm"),
+        ("pen up", "15.0 mm"),
+        ("time of the arm", "0 min 3.7 s"),
+    ] {
+        assert_eq!(run.field(field), value, "{field}, in:\n{}", run.stdout);
+    }
+}
+
+#[test]
 fn a_refused_line_is_named_and_the_exit_status_is_1() {
     let run = draw_text(
         "G01 Z0\nG01 X1100\n\nG02 X5 Y5\nG01 X1200\r\n; comment\nG01 Q7",

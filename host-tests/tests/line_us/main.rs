@@ -2,6 +2,7 @@
 
 mod clients;
 mod draw;
+mod drawings;
 mod flood;
 mod framing;
 mod memory;

@@ -1,7 +1,7 @@
 //! The memory of firmware before 0.1.0: name, calibration and network, each by itself, under a key, in
 //! one map over the whole flash.
 
-use crate::chip::{Chip, Tear};
+use crate::chip::{Chip, PAGES, Tear};
 use crate::dice::Dice;
 use crate::owner::{self, Habits};
 use embassy_futures::block_on;
@@ -64,12 +64,34 @@ fn change(settings: &mut Settings, dice: &mut Dice) -> (u8, Vec<u8>) {
     }
 }
 
+/// The page that is in use, which is marked at its beginning and not at its end, and how many bytes are
+/// left in it.
+fn in_use<const PAGE: usize>(chip: &Chip<PAGE>) -> (usize, usize) {
+    let cells = chip.state().cells;
+    let mut pages = cells.chunks(PAGE).enumerate();
+    let (index, page) = pages
+        .find(|(_, page)| page[0] == 0 && page[PAGE - 1] == 0xff)
+        .expect("something was stored");
+    let free = page.iter().rev().take_while(|byte| **byte == 0xff);
+    (index, free.count())
+}
+
 /// Lives with such firmware for a while, and gives the settings that it has in the end. The last store
 /// may have been cut.
 pub fn live<const PAGE: usize>(chip: &Chip<PAGE>, dice: &mut Dice) -> Settings {
     let mut settings = Settings::default();
-    let stores = 1 + dice.below(PAGE / 2);
-    for _ in 0..stores {
+    let (stores, until) = (1 + dice.below(PAGE / 2), dice.below(4));
+    for number in 0.. {
+        // Half of them until there is hardly any room left, in any page or in the last one.
+        let goes_on = number == 0
+            || match (until, in_use(chip)) {
+                (0, (_, room)) => room > 60,
+                (1, (page, room)) => room > 60 || page < PAGES - 1,
+                _ => number < stores,
+            };
+        if !goes_on {
+            break;
+        }
         let (key, mut value) = change(&mut settings, dice);
         value.insert(0, VERSION);
         put(chip, key, &value);

@@ -1,4 +1,4 @@
-//! The settings in flash: power cuts, garbage, worn pages, and the form of earlier firmware.
+//! Settings and drawings in flash: power cuts, garbage, worn pages, wear, and the form of earlier firmware.
 //!
 //! `QUILL_HISTORIES=5000 cargo test --release -p host-tests --test memory -- --nocapture` tries as many
 //! histories, and takes its time; the figures are printed.
@@ -6,6 +6,8 @@
 mod chip;
 mod damage;
 mod dice;
+mod drawings;
+mod drawings_wear;
 mod earlier;
 mod owner;
 mod power_cuts;

@@ -1,7 +1,7 @@
 //! What owners do to the settings of their machines.
 
 use crate::dice::Dice;
-use protocol_core::arm::{Angles, Calibration};
+use protocol_core::arm::{Angles, Calibration, Directions, NibShift, ZMap};
 use protocol_core::motion::Microdegrees;
 use protocol_core::settings::{AccessPointName, MachineName, Settings, StartMode};
 use protocol_core::wifi::{MAX_PASSWORD, MAX_SSID, MIN_PASSWORD, Network, Password, Ssid};
@@ -52,13 +52,13 @@ pub fn network(dice: &mut Dice, (longest_name, longest_password): (usize, usize)
 /// Settings after the owner has changed something.
 pub fn change(before: &Settings, dice: &mut Dice, habits: Habits) -> Settings {
     let mut after = before.clone();
-    match dice.below(9) {
+    match dice.below(12) {
         0 | 1 => after.name = name(dice),
         2 => after.calibration = calibration(dice),
         3 | 4 => {
             let network = network(dice, habits.lengths);
             // One that is not remembered any more makes room.
-            if after.networks.len() == habits.networks
+            if after.networks.len() >= habits.networks
                 && let Some(oldest) = before.networks.iter().next()
             {
                 after.networks.remove(&oldest.ssid);
@@ -74,6 +74,15 @@ pub fn change(before: &Settings, dice: &mut Dice, habits: Habits) -> Settings {
         7 => {
             after.access_point = AccessPointName::from_number(1 + dice.byte() % 2).expect("1 or 2");
         }
+        8 => {
+            let corners = [0; 4].map(|_: i16| i16::from(dice.byte()));
+            after.map = ZMap::new(corners).expect("heights below 500");
+        }
+        9 => {
+            let hundredths = i16::from(dice.byte() % 201);
+            after.shift = NibShift::from_hundredths(hundredths).expect("2 mm at most");
+        }
+        10 => after.directions = Directions::from_byte(dice.byte() % 8).expect("three bits"),
         _ => after.waves = !after.waves,
     }
     after

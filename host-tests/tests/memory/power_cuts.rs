@@ -263,7 +263,7 @@ fn all(histories: u64, history: impl Fn(u64) -> Figures + Sync) -> Figures {
 
 #[test]
 fn nothing_is_lost_wherever_the_power_fails() {
-    let histories = long_run().unwrap_or(40);
+    let histories = long_run().unwrap_or(30);
     all(histories, |history| live::<256>(history, 6, Habits::MODEST)).report("pages of 256 bytes");
 }
 
@@ -285,6 +285,6 @@ fn nothing_is_lost_when_settings_of_earlier_firmware_are_carried_over() {
 
 #[test]
 fn one_copy_is_safe_as_well() {
-    let histories = long_run().unwrap_or(20);
+    let histories = long_run().unwrap_or(12);
     all(histories, |history| live_with_one_half::<256>(history, 6)).report("one half worn out");
 }

@@ -46,6 +46,11 @@ fn right() -> BoxedStrategy<String> {
         2 => (maybe(number(5.0, 30.0)), maybe(number(15.0, 100.0)))
             .prop_map(|(s, p)| words("G94", &[("S", s), ("P", p)])),
         1 => select(&["M114", "M114 S", "M115", "M122", "M550", "; nothing", "(nothing)"][..]).prop_map(Into::into),
+        1 => (number(0.0, 0.2)).prop_map(|seconds| format!("G4 P{seconds}")),
+        1 => (maybe(number(450.0, 2000.0)), maybe(number(-1600.0, 1600.0)), maybe(number(-100.0, 1100.0)), select(&["", " Kxy", " KZ"][..]))
+            .prop_map(|(x, y, z, k)| words("G40", &[("X", x), ("Y", y), ("Z", z)]) + k),
+        1 => select(&["G31", "G31 S0;100;300;200", "G31 S-500;500;0;7 P2", "G31 P-1.5", "G31 Sclear P0"][..]).prop_map(Into::into),
+        1 => select(&["M280", "M280 S2", "M280 E2 P2", "M280 S1 E1 P1"][..]).prop_map(Into::into),
         1 => select(&["M374", "M374 Sclear", "m374 s\"clear\""][..]).prop_map(Into::into),
         1 => "[a-z0-9][a-z0-9-]{0,30}[a-z0-9]".prop_map(|name| format!("M550 P\"{name}\"")),
     ]

@@ -1,6 +1,7 @@
 //! What holds for any sequence of lines, right or wrong, through sessions and machine.
 
 mod lines;
+mod nib;
 
 use host_tests::bench::{Answer, Bench};
 use host_tests::model;
@@ -80,10 +81,12 @@ fn say_all(bench: &mut Bench, lines: &[Said]) -> Result<Vec<Answer>, TestCaseErr
 /// Everything that can be seen of an arm, its scales and origins by a move of each client.
 fn look(bench: &mut Bench) -> String {
     let mut seen = format!(
-        "{:?} {:?} {:?} {}",
+        "{:?} {:?} {:?} {:?} {:?} {}",
         bench.frames,
         bench.machine().steps(),
         bench.machine().calibration(),
+        bench.machine().compensation(),
+        bench.machine().directions(),
         bench.name()
     );
     for client in 0..MAX_CLIENTS as u8 {

@@ -220,7 +220,7 @@ impl Machine {
         }
         let served = house.clone();
         spawner.spawn(async move {
-            let flash = BlockingAsync::new(FileFlash::in_memory());
+            let flash = BlockingAsync::new(FileFlash::in_memory(SIZE));
             let memory = Memory::new(flash, 0..SIZE).unwrap();
             served.store.run(memory).await
         });

@@ -5,7 +5,7 @@
 //! `t2 = phi - h`; the servos stand at `S = t1 + 45 deg` and `E = 45 deg - t2`.
 
 use super::tables::{ATAN, HALF_ELBOW, SINE, high_half};
-use crate::motion::{Coordinate, HOME, Microdegrees, PEN_UP, Position};
+use crate::motion::{Coordinate, HOME, Microdegrees, PEN_DOWN, PEN_UP, Position};
 
 /// Length of upper link and forearm, in drawing units.
 pub(crate) const LINK: i32 = 1000;
@@ -80,7 +80,8 @@ impl PenLift {
         }
     }
 
-    fn angle(self, z: Coordinate) -> Microdegrees {
+    /// The servo's angle at a Z of -1000 to 1000.
+    pub(crate) fn angle(self, z: Coordinate) -> Microdegrees {
         if z == PEN_UP {
             return HOME_ANGLES.pen;
         }
@@ -88,13 +89,24 @@ impl PenLift {
         Microdegrees::new(self.down.get() + high_half(z.bits() << 4, self.slope))
     }
 
-    fn height(self, pen: Microdegrees) -> Coordinate {
+    /// How fast Z changes when the servo turns at so many degrees a second, in 1/65536 units a
+    /// microsecond.
+    pub(crate) fn rate(self, degrees_per_second: u16) -> u32 {
+        // Degrees a second are microdegrees a microsecond.
+        let turned = u64::from(degrees_per_second) << (12 + Coordinate::FRACTION_BITS);
+        let rate = turned / u64::from(self.slope.unsigned_abs().max(1));
+        rate.min(u32::MAX.into()) as u32
+    }
+
+    /// The Z at which the servo stands so, from -1000 to 1000.
+    pub(crate) fn height(self, pen: Microdegrees) -> Coordinate {
         if self.slope == 0 {
             return PEN_UP;
         }
         let raised = i64::from(pen.get()) - i64::from(self.down.get());
         let bits = (raised << 28) / i64::from(self.slope);
-        Coordinate::from_bits(bits.clamp(0, i64::from(PEN_UP.bits())) as i32)
+        let most = i64::from(PEN_UP.bits());
+        Coordinate::from_bits(bits.clamp(-most, most) as i32)
     }
 }
 
@@ -148,8 +160,17 @@ pub(crate) const fn square_of(bits: i32) -> u32 {
     high_half(bits << 4, bits << 4).cast_unsigned()
 }
 
-/// Where the nib is when the servos stand at `angles`, within 0.001 units.
+/// Where the nib is when the servos stand at `angles`, within 0.001 units; Z is limited to 0..=1000.
 pub fn forward(angles: Angles, lift: PenLift) -> Position {
+    let bare = bare_forward(angles, lift);
+    Position {
+        z: bare.z.max(PEN_DOWN),
+        ..bare
+    }
+}
+
+/// The same with the pen as low as its servo has it, down to Z = -1000.
+pub(crate) fn bare_forward(angles: Angles, lift: PenLift) -> Position {
     let (upper, forearm) = joint_directions(angles);
     let (x1, y1) = link_end(upper);
     let (x2, y2) = link_end(forearm);

@@ -30,6 +30,12 @@ impl ServoRange {
         }
     }
 
+    /// The range of the same servo, built in the other way around: it mirrors at 90 degrees.
+    #[must_use]
+    pub const fn mirrored(self) -> Self {
+        Self::new(self.at_180, self.at_0)
+    }
+
     /// The pulse for an angle; beyond 0..=180 degrees the nearest one in range.
     #[inline]
     pub fn pulse(self, angle: Microdegrees) -> PulseWidth {
@@ -58,6 +64,28 @@ impl Default for ServoRange {
     /// 500 us at 0 degrees, 2500 us at 180 degrees.
     fn default() -> Self {
         Self::new(PulseWidth::from_micros(500), PulseWidth::from_micros(2500))
+    }
+}
+
+/// Which servos turn the other way than the board says, set by `M280` (`reference/line-us.md`, section 5).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Directions {
+    /// Shoulder, elbow, pen: `true` turns the other way.
+    pub reversed: [bool; 3],
+}
+
+impl Directions {
+    /// For the settings: a bit for each servo.
+    pub fn to_byte(self) -> u8 {
+        let [shoulder, elbow, pen] = self.reversed.map(u8::from);
+        shoulder | elbow << 1 | pen << 2
+    }
+
+    /// What [`Self::to_byte`] made.
+    pub fn from_byte(byte: u8) -> Option<Self> {
+        (byte < 8).then_some(Self {
+            reversed: [1, 2, 4].map(|bit| byte & bit != 0),
+        })
     }
 }
 
@@ -153,6 +181,36 @@ mod tests {
             range.pulse(Microdegrees::from_degrees(190)),
             PulseWidth::from_micros(600)
         );
+    }
+
+    #[test]
+    fn a_mirrored_servo_mirrors_at_90_degrees() {
+        let range = ServoRange::new(PulseWidth::from_micros(600), PulseWidth::from_micros(2400));
+        for degrees in 0..=180 {
+            let angle = Microdegrees::from_degrees(degrees);
+            let mirrored = Microdegrees::from_degrees(180 - degrees);
+            let (there, here) = (range.mirrored().pulse(angle), range.pulse(mirrored));
+            assert!(
+                there.get().abs_diff(here.get()) <= 1,
+                "{degrees} deg: {there:?}, not {here:?}"
+            );
+        }
+        assert_eq!(range.mirrored().mirrored(), range);
+    }
+
+    #[test]
+    fn directions_survive_their_byte() {
+        for byte in 0..8 {
+            assert_eq!(
+                Directions::from_byte(byte).map(Directions::to_byte),
+                Some(byte)
+            );
+        }
+        assert_eq!(Directions::from_byte(8), None);
+        let elbow = Directions {
+            reversed: [false, true, false],
+        };
+        assert_eq!(elbow.to_byte(), 2);
     }
 
     #[test]

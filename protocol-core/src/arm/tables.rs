@@ -85,6 +85,23 @@ pub(super) static HALF_ELBOW: Table<122> = {
     Table(pieces)
 };
 
+/// `1 / r` in 1/2^39 of r^2 in 2^15 square units; below r = 478, where the drawing area is not, as at it.
+pub(super) static RECIPROCAL: Table<122> = {
+    let mut pieces = [EMPTY; 122];
+    let mut segment = 0;
+    while segment < 122 {
+        let from = if segment < 7 { 7.0 } else { segment as f64 };
+        pieces[segment] = fit(
+            reciprocal(from),
+            reciprocal(from + 0.25),
+            reciprocal(from + 0.75),
+            reciprocal(from + 1.0),
+        );
+        segment += 1;
+    }
+    Table(pieces)
+};
+
 /// `1000 sin` in 1/65536 units of an angle in 1/64 of a right angle.
 pub(super) static SINE: Table<65> = {
     let mut pieces = [EMPTY; 65];
@@ -137,6 +154,10 @@ const fn half_elbow(segment: f64) -> f64 {
         return core::f64::consts::FRAC_PI_2;
     }
     atan(sqrt((1.0 - cosine_squared) / cosine_squared))
+}
+
+const fn reciprocal(segment: f64) -> f64 {
+    (1u64 << 39) as f64 / sqrt(segment * 32_768.0)
 }
 
 /// Sine of a fraction of a right angle, by its Taylor series.
@@ -218,6 +239,10 @@ mod tests {
             (at * 32768.0 / 4e6).sqrt().acos().to_degrees() * 1e6
         });
         assert!(elbow < 250.0, "half elbow: {elbow} microdegrees");
+        let reciprocal = worst(&RECIPROCAL, 7, 117, |at| {
+            2f64.powi(39) / (at * 32768.0).sqrt()
+        });
+        assert!(reciprocal < 6e4, "1 / r: {reciprocal} / 2^39");
         let sine = worst(&SINE, 0, 64, |at| {
             (at / 64.0 * 90f64).to_radians().sin() * 65_536_000.0
         });

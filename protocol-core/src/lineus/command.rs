@@ -1,10 +1,16 @@
 //! A line becomes a typed command here, once; nothing downstream sees text.
 
+mod fitting;
+
 use super::refusal::Refusal;
-use crate::machine::Manner;
-use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
+use crate::arm::{NibShift, ZMap};
+use crate::drawings::{ButtonDraws, MAX_DRAWINGS, Replay, Slot};
+use crate::machine::{Bare, Manner};
+use crate::motion::{
+    Coordinate, MAX_COORDINATE, MAX_SCALE, Micros, StepRange, StepSize, Transform,
+};
 use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
-use crate::text::Words;
+use crate::text::{Text, Words};
 use crate::update::{MAX_ADDRESS, ManifestAddress};
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Password, Ssid};
 
@@ -58,6 +64,10 @@ pub enum Command {
         /// How its own network is called.
         name: Option<AccessPointName>,
     },
+    /// M589.
+    OwnNetwork,
+    /// `M589 P`: the password of the machine's own network, `None` for an open one.
+    ProtectOwnNetwork(Option<Password>),
     /// M291.
     Waves,
     /// `M291 S1`, `M291 S2`.
@@ -79,6 +89,47 @@ pub enum Command {
     Update,
     /// `M997 S`: where to ask from now on; with an empty text, nowhere.
     SetUpdateAddress(Option<ManifestAddress>),
+    /// M20.
+    Drawings,
+    /// M39.
+    Space,
+    /// M23.
+    Button,
+    /// `M23 S`, `M23 S2 K`.
+    SetButton(ButtonDraws),
+    /// `M23 K`.
+    Draw(Slot),
+    /// `M23 K0`.
+    StopDrawing,
+    /// `M28 S`.
+    Record(Slot),
+    /// M29.
+    EndRecording,
+    /// `M30 S`.
+    Delete(Slot),
+    /// M85.
+    Replaying,
+    /// `M85 S P K`; `M85 S0` for `None`.
+    SetReplay(Option<Replay>),
+    /// G4.
+    Dwell(Micros),
+    /// G31.
+    Compensation,
+    /// `G31 S`, `G31 P`.
+    SetCompensation {
+        /// How high the paper lies.
+        map: Option<ZMap>,
+        /// How the nib moves as it comes down.
+        shift: Option<NibShift>,
+    },
+    /// G40.
+    Uncalibrated(Axes, Bare),
+    /// `M171 Sconfirm`.
+    FactoryReset,
+    /// M280.
+    Directions,
+    /// `M280 S E P`: whether shoulder, elbow and pen turn the other way.
+    SetDirections([Option<bool>; 3]),
 }
 
 /// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
@@ -122,18 +173,32 @@ fn other_than_a_move<'a>(
     line: &'a [u8],
 ) -> Result<Command, Refusal<'a>> {
     match code {
+        (b'G', 4) => fitting::dwell(&mut words),
         (b'G', 28) => without_parameters(&mut words, Command::Home),
+        (b'G', 31) => fitting::compensation(&mut words),
+        (b'G', 40) => fitting::uncalibrated(&mut words),
         (b'G', 54) => transform(&mut words),
         (b'G', 94) => speed(&mut words),
+        (b'M', 20) => without_parameters(&mut words, Command::Drawings),
+        (b'M', 23) => button(&mut words),
+        (b'M', 28) => Ok(Command::Record(one_slot(&mut words)?)),
+        (b'M', 29) => without_parameters(&mut words, Command::EndRecording),
+        (b'M', 30) => Ok(Command::Delete(one_slot(&mut words)?)),
+        (b'M', 39) => without_parameters(&mut words, Command::Space),
+        (b'M', 85) => replay(&mut words),
         (b'M', 114) => position(&mut words),
         (b'M', 115) => without_parameters(&mut words, Command::Capabilities),
         (b'M', 122) => without_parameters(&mut words, Command::Diagnostics),
+        (b'M', number @ (170 | 172)) => Err(Refusal::Reserved(number)),
+        (b'M', 171) => fitting::factory_reset(&mut words),
+        (b'M', 280) => fitting::directions(&mut words),
         (b'M', 374) => calibration(&mut words),
         (b'M', 550) => name(&mut words),
         (b'M', 291) => waves(&mut words),
         (b'M', 552) => start(&mut words),
         (b'M', 587) => network(&mut words),
         (b'M', 588) => forget(&mut words),
+        (b'M', 589) => own_network(&mut words),
         (b'M', 997) => update(&mut words),
         _ => Err(Words::new(line).unknown().into()),
     }
@@ -295,11 +360,7 @@ fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         letters.once(letter)?;
         match letter {
             'S' => ssid = Some(network_name(words)?),
-            'P' => {
-                let phrase = words.text(letter)?.unescape::<MAX_PASSWORD>();
-                let phrase = phrase.and_then(|phrase| Password::new(&phrase));
-                password = Some(phrase.ok_or(Refusal::BadPassword)?);
-            }
+            'P' => password = Some(network_password(&words.text(letter)?)?),
             _ => return Err(Refusal::UnknownParameter(letter)),
         }
     }
@@ -345,11 +406,128 @@ fn update<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     }
 }
 
+/// M589 is where RepRap firmware has the password of a machine's own network.
+fn own_network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    match words.letter()? {
+        None => Ok(Command::OwnNetwork),
+        Some('P') => {
+            let text = words.text('P')?;
+            let password = match text.raw() {
+                [] => None,
+                _ => Some(network_password(&text)?),
+            };
+            without_parameters(words, Command::ProtectOwnNetwork(password))
+        }
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn network_password<'a>(text: &Text<'a>) -> Result<Password, Refusal<'a>> {
+    text.unescape::<MAX_PASSWORD>()
+        .and_then(|phrase| Password::new(&phrase))
+        .ok_or(Refusal::BadPassword)
+}
+
 fn network_name<'a>(words: &mut Words<'a>) -> Result<Ssid, Refusal<'a>> {
     let text = words.text('S')?;
     text.unescape::<MAX_SSID>()
         .and_then(|name| Ssid::new(&name))
         .ok_or(Refusal::BadText('S', text.raw(), "1 to 32 bytes"))
+}
+
+fn button<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    let mut letters = Letters::default();
+    let (mut number, mut place) = (None, None);
+    while let Some(letter) = words.letter()? {
+        letters.once(letter)?;
+        match letter {
+            'S' => number = Some(whole(words, letter, 0, 3)? as u8),
+            'K' => place = Some(whole(words, letter, 0, MAX_DRAWINGS.into())? as u8),
+            _ => return Err(Refusal::UnknownParameter(letter)),
+        }
+    }
+    let Some(number) = number else {
+        return Ok(match place.map(Slot::new) {
+            None => Command::Button,
+            Some(Some(slot)) => Command::Draw(slot),
+            Some(None) => Command::StopDrawing,
+        });
+    };
+    match (ButtonDraws::new(number, place.and_then(Slot::new)), place) {
+        (Some(choice), _) => Ok(Command::SetButton(choice)),
+        (None, None) => Err(Refusal::Missing('K')),
+        (None, Some(0)) => Err(Refusal::NotWhole {
+            letter: 'K',
+            least: 1,
+            most: MAX_DRAWINGS.into(),
+        }),
+        (None, Some(_)) => Err(Refusal::OnlyWith('K', "S2")),
+    }
+}
+
+/// `S` with a slot, and nothing more.
+fn one_slot<'a>(words: &mut Words<'a>) -> Result<Slot, Refusal<'a>> {
+    match words.letter()? {
+        None => return Err(Refusal::Missing('S')),
+        Some('S') => {}
+        Some(letter) => return Err(Refusal::UnknownParameter(letter)),
+    }
+    let slot = slot(words, 'S')?;
+    match words.letter()? {
+        None => Ok(slot),
+        Some('S') => Err(Refusal::Repeated('S')),
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+fn slot<'a>(words: &mut Words<'a>, letter: char) -> Result<Slot, Refusal<'a>> {
+    let number = whole(words, letter, 1, MAX_DRAWINGS.into())?;
+    Ok(Slot::new(number as u8).unwrap_or(Slot::FIRST))
+}
+
+fn replay<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    let mut letters = Letters::default();
+    let (mut seconds, mut every, mut place) = (None, None, None);
+    while let Some(letter) = words.letter()? {
+        letters.once(letter)?;
+        match letter {
+            'S' => seconds = Some(whole(words, letter, 0, Replay::MAX_SECONDS)?),
+            'P' => every = Some(whole(words, letter, 1, Replay::MAX_SECONDS)?),
+            'K' => place = Some(slot(words, letter)?),
+            _ => return Err(Refusal::UnknownParameter(letter)),
+        }
+    }
+    Ok(match (seconds, every, place) {
+        (None, None, None) => Command::Replaying,
+        (Some(0), ..) => Command::SetReplay(None),
+        _ => Command::SetReplay(Some(Replay {
+            slot: place.unwrap_or(Slot::FIRST),
+            seconds: seconds.unwrap_or(Replay::DEFAULT_SECONDS),
+            every: every.unwrap_or(Replay::DEFAULT_EVERY),
+        })),
+    })
+}
+
+/// A whole number from `least` to `most`.
+fn whole<'a>(
+    words: &mut Words<'a>,
+    letter: char,
+    least: u16,
+    most: u16,
+) -> Result<u16, Refusal<'a>> {
+    const BITS: u32 = 16;
+    let value = words.fixed(letter, BITS, most.into())?;
+    let number = value
+        .ok()
+        .filter(|bits| bits % (1 << BITS) == 0)
+        .and_then(|bits| u16::try_from(bits >> BITS).ok());
+    number
+        .filter(|number| (least..=most).contains(number))
+        .ok_or(Refusal::NotWhole {
+            letter,
+            least,
+            most,
+        })
 }
 
 /// A whole number from 1 to `most`.
@@ -376,10 +554,12 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
                 Command::Angles
                     | Command::ClearCalibration
                     | Command::Rename(_)
+                    | Command::ProtectOwnNetwork(_)
                     | Command::SetWaves(_)
                     | Command::Forget(_)
                     | Command::ForgetAll
                     | Command::SetUpdateAddress(_)
+                    | Command::FactoryReset
             ) =>
         {
             Err(Refusal::Repeated(letter))

@@ -2,11 +2,12 @@
 //! (specification 1.0.4a with `reference/line-us.md`).
 
 mod command;
+mod recording;
 mod refusal;
 mod reply;
 mod session;
 
 pub use command::{Command, parse};
 pub use refusal::Refusal;
-pub use reply::{Diagnostics, Identity, MAX_REPLY, Reply, TERMINATOR, VERSION};
+pub use reply::{Diagnostics, Identity, InWords, MAX_REPLY, Reply, STOPPED, TERMINATOR, VERSION};
 pub use session::{Request, Session};

@@ -1,5 +1,7 @@
 //! Why a line is refused, and the one place where that becomes text.
 
+use crate::arm::MAX_HEIGHT;
+use crate::drawings::Slot;
 use crate::settings::MAX_NAME;
 use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt, excerpt_of_bytes};
 use crate::update::MAX_ADDRESS;
@@ -13,6 +15,10 @@ pub enum Refusal<'a> {
     TooLong,
     /// The line is no words.
     Words(WordError<'a>),
+    /// An M code of the original's that no document tells the meaning of.
+    Reserved(u32),
+    /// A code that is for other connections than WebSockets.
+    NotHere(u32),
     /// A letter that the command does not have.
     UnknownParameter(char),
     /// A letter that the command needs.
@@ -32,8 +38,25 @@ pub enum Refusal<'a> {
     ZeroScale,
     /// Not one of the whole numbers from 1 to this one.
     NoChoice(char, u8),
+    /// Not one of the whole numbers from the first to the second.
+    NotWhole {
+        /// The parameter's letter.
+        letter: char,
+        /// Least value.
+        least: u16,
+        /// Largest value.
+        most: u16,
+    },
+    /// A letter that goes with another parameter only.
+    OnlyWith(char, &'static str),
+    /// A command that has no place in a drawing that is recorded.
+    NotRecorded(&'a str),
+    /// No drawing is in this slot.
+    NoSuchDrawing(Slot),
     /// A text that the parameter cannot have, and what it may be.
     BadText(char, &'a [u8], &'static str),
+    /// No map of heights.
+    BadMap(&'a [u8]),
     /// A password of a length that none has; what it is stays a secret.
     BadPassword,
     /// No machine name.
@@ -63,6 +86,8 @@ impl fmt::Display for Refusal<'_> {
         match *self {
             Self::TooLong => write!(out, "line longer than {MAX_LINE} bytes"),
             Self::Words(error) => words(error, out),
+            Self::Reserved(number) => write!(out, "M{number} is reserved and does nothing here"),
+            Self::NotHere(code) => write!(out, "M{code} is refused over the WebSocket"),
             Self::Missing(letter) => write!(out, "parameter {letter} is missing"),
             Self::UnknownParameter(letter) => write!(out, "unknown parameter {letter}"),
             Self::Repeated(letter) => write!(out, "parameter {letter} is repeated"),
@@ -76,6 +101,16 @@ impl fmt::Display for Refusal<'_> {
             Self::NoChoice(letter, most) => {
                 write!(out, "{letter} must be a whole number, 1 to {most}")
             }
+            Self::NotWhole {
+                letter,
+                least,
+                most,
+            } => write!(out, "{letter} must be a whole number, {least} to {most}"),
+            Self::OnlyWith(letter, other) => write!(out, "{letter} goes with {other} only"),
+            Self::NotRecorded(code) => {
+                write!(out, "{} cannot be part of a drawing", short(code))
+            }
+            Self::NoSuchDrawing(slot) => write!(out, "no drawing {} is stored", slot.number()),
             Self::ZeroScale => out.write_str("S must not be zero"),
             Self::BadText(letter, text, expected) => {
                 write!(
@@ -84,6 +119,11 @@ impl fmt::Display for Refusal<'_> {
                     excerpt_of_bytes(text, MAX_EXCERPT)
                 )
             }
+            Self::BadMap(text) => write!(
+                out,
+                "S is '{}', it may be 'clear' or four whole numbers, -{MAX_HEIGHT} to {MAX_HEIGHT}, as in 0;100;300;200",
+                excerpt_of_bytes(text, MAX_EXCERPT)
+            ),
             Self::BadPassword => write!(out, "P must be {MIN_PASSWORD} to {MAX_PASSWORD} bytes"),
             Self::BadName(text) => write!(
                 out,

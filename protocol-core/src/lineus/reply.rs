@@ -1,7 +1,8 @@
 //! What the machine says: one message for each command, built in place, ended as every message is.
 
 use super::refusal::Refusal;
-use crate::arm::{Angles, Calibration};
+use crate::arm::{Angles, Calibration, Compensation, Directions, NibShift, ZMap};
+use crate::drawings::{ButtonDraws, Contents, MAX_DRAWINGS, Replay, Space};
 use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
 use crate::settings::{MachineName, Settings};
@@ -14,11 +15,16 @@ use heapless::Vec;
 /// Ends every message to a client, the greeting included.
 pub const TERMINATOR: &str = "\r\n\0";
 /// Longest message, terminator included. Everyday replies stay below 256 bytes, because some clients
-/// read one packet for each reply into a buffer of that size; diagnostics and lists of networks may be
-/// longer. Every network that is remembered fits into such a list, whatever its name.
-pub const MAX_REPLY: usize = 768;
+/// read one packet for each reply into a buffer of that size; diagnostics, lists of networks and lists
+/// of drawings may be longer. Every network that is remembered fits into such a list, whatever its name.
+pub const MAX_REPLY: usize = 896;
 const _: () = assert!(
     "ok ".len() + MAX_NETWORKS * (" \"\":1".len() + 2 * MAX_SSID) + TERMINATOR.len() <= MAX_REPLY
+);
+// A list of drawings fits as well: `/0000001.txt-` and at most ten digits for each.
+const _: () = assert!(
+    "ok FS:\"\"".len() + MAX_DRAWINGS as usize * "/0000001.txt-1474560;".len() + TERMINATOR.len()
+        <= MAX_REPLY
 );
 /// Version in the greeting: the level of the original's protocol that is complete, then our own.
 pub const VERSION: &str = concat!("1.0.4 Quill ", env!("QUILL_VERSION"));
@@ -46,6 +52,8 @@ impl Identity {
 pub struct Diagnostics<'a> {
     /// The machine's name.
     pub name: &'a MachineName,
+    /// The name under which it is found, without `.local`; `None` where it is not.
+    pub host: Option<&'a str>,
     /// Who it is.
     pub identity: Identity,
     /// Time since it started.
@@ -54,6 +62,10 @@ pub struct Diagnostics<'a> {
     pub position: Position,
     /// The servos' offsets.
     pub calibration: Calibration,
+    /// Paper and lift.
+    pub compensation: &'a Compensation,
+    /// Which servos turn the other way.
+    pub directions: Directions,
     /// What the network is doing.
     pub wifi: &'a Status,
     /// How many networks are remembered.
@@ -68,6 +80,8 @@ pub struct Diagnostics<'a> {
     pub update: &'a update::Status,
     /// Whose signature is believed.
     pub update_key: KeyName,
+    /// Room for drawings.
+    pub space: Space,
     /// The last words of a firmware that panicked before, if there are any.
     pub last_panic: &'a str,
 }
@@ -97,6 +111,13 @@ impl Reply {
     pub fn message(&self) -> &str {
         let message = self.text.strip_suffix(TERMINATOR.as_bytes());
         core::str::from_utf8(message.unwrap_or(&self.text)).unwrap_or_default()
+    }
+
+    /// Why something was refused, if it says so.
+    pub fn reason(&self) -> Option<&str> {
+        self.message()
+            .strip_prefix("error INFO:\"")?
+            .strip_suffix('"')
     }
 
     /// Whether it says that something was refused.
@@ -133,7 +154,8 @@ impl Reply {
     pub fn report(&mut self, report: &Report) {
         match report {
             Report::Resting => self.ok(),
-            Report::Moving { end, limited } => self.place(*end, limited.map(tell)),
+            Report::Stopped => self.error(format_args!("{STOPPED}")),
+            Report::Moving { end, limited } => self.place(*end, limited.map(Limited::text)),
         }
     }
 
@@ -171,9 +193,29 @@ impl Reply {
         ));
     }
 
+    /// Whether its own network takes a password, which is not told.
+    pub fn own_network(&mut self, settings: &Settings) {
+        let password = match settings.own_password {
+            Some(_) => "set",
+            None => "none",
+        };
+        self.compose(format_args!("ok PASSWORD:{password}"));
+    }
+
     /// Whether the machine waves.
     pub fn waves(&mut self, on: bool) {
         self.compose(format_args!("ok S:{}", if on { 1 } else { 2 }));
+    }
+
+    /// How high the paper lies, and how far the nib moves as it comes down.
+    pub fn compensation(&mut self, map: ZMap, shift: NibShift) {
+        self.compose(format_args!("ok S:{map} P:{shift}"));
+    }
+
+    /// Which servos turn the other way.
+    pub fn directions(&mut self, directions: Directions) {
+        let [shoulder, elbow, pen] = numbers(directions);
+        self.compose(format_args!("ok S:{shoulder} E:{elbow} P:{pen}"));
     }
 
     /// Networks: those that are heard, in the order given, which is by strength, each with 1 where it is
@@ -215,6 +257,48 @@ impl Reply {
         self.push(TERMINATOR);
     }
 
+    /// Drawings, as files: name and bytes (`reference/line-us.md`, section 5, M20).
+    pub fn drawings(&mut self, contents: &Contents) {
+        self.compose(format_args!("ok FS:\"{}\"", Files(contents)));
+    }
+
+    /// Room for drawings (`reference/line-us.md`, section 5, M39).
+    pub fn space(&mut self, space: Space) {
+        self.compose(format_args!(
+            "ok FSUsed:{} FSTotal:{} FSFree:{} FSPercent:{}",
+            space.used,
+            space.total,
+            space.free(),
+            space.percent()
+        ));
+    }
+
+    /// What the button draws.
+    pub fn button(&mut self, choice: ButtonDraws) {
+        let number = choice.number();
+        match choice.slot() {
+            Some(slot) => self.compose(format_args!("ok S:{number} K:{}", slot.number())),
+            None => self.compose(format_args!("ok S:{number}")),
+        }
+    }
+
+    /// What is replayed.
+    pub fn replay(&mut self, replay: Option<Replay>) {
+        match replay {
+            Some(Replay {
+                slot,
+                seconds,
+                every,
+            }) => self.compose(format_args!("ok S:{seconds} P:{every} K:{}", slot.number())),
+            None => self.compose(format_args!("ok S:0")),
+        }
+    }
+
+    /// Done, and something to know about it.
+    pub fn ok_with(&mut self, info: fmt::Arguments<'_>) {
+        self.compose(format_args!("ok INFO:\"{info}\""));
+    }
+
     fn push_entry(&mut self, ssid: &Ssid, state: char) {
         if !self.text.ends_with(b" ") {
             self.push(" ");
@@ -234,12 +318,15 @@ impl Reply {
         let [a, b, c, d, e, f] = state.identity.mac;
         let Position { x, y, z } = state.position;
         let [shoulder, elbow, pen] = state.calibration.offsets.to_array().map(Degrees);
+        let [turn_s, turn_e, turn_p] = numbers(state.directions);
+        let (map, shift) = (state.compensation.map(), state.compensation.shift());
         self.compose(format_args!(
-            "ok name:{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
+            "ok name:{}{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
-             WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
-             Memory:\"{}\" UpdateKey:{} Update:\"{}\"{}",
+             ZMap:{map} NibShift:{shift} Servos:{turn_s},{turn_e},{turn_p} WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
+             FSUsed:{} FSTotal:{} FSFree:{} Memory:\"{}\" UpdateKey:{} Update:\"{}\"{}",
             state.name.as_str(),
+            Host(state.host),
             state.identity.serial(),
             Uptime(state.uptime),
             x.rounded(),
@@ -250,6 +337,9 @@ impl Reply {
             InWords(state.wifi),
             state.free_memory,
             state.reset_reason,
+            state.space.used,
+            state.space.total,
+            state.space.free(),
             state.memory,
             state.update_key,
             state.update,
@@ -327,12 +417,12 @@ impl Reply {
     }
 }
 
-fn tell(limited: Limited) -> &'static str {
-    match limited {
-        Limited::Target { lifted: true } => "out of reach: going to the closest point, pen lifted",
-        Limited::Target { lifted: false } => "out of reach: going to the closest point",
-        Limited::Way => "the way leaves the drawing area: held at its edge",
-    }
+/// Why there is no move: the machine is stopped.
+pub const STOPPED: &str = "the machine is stopped: send ~ on the serial line or press the button";
+
+/// As behind the letters of M280.
+fn numbers(directions: Directions) -> [u8; 3] {
+    directions.reversed.map(|reversed| 1 + u8::from(reversed))
 }
 
 const fn mode(own_network: bool) -> &'static str {
@@ -354,7 +444,8 @@ fn entry_length(ssid: &Ssid) -> usize {
 }
 
 /// What the network is doing, without double quotes.
-struct InWords<'a>(&'a Status);
+#[derive(Clone, Copy, Debug)]
+pub struct InWords<'a>(pub &'a Status);
 
 impl fmt::Display for InWords<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -381,6 +472,17 @@ impl fmt::Display for InWords<'_> {
     }
 }
 
+/// Drawings as files in a list.
+struct Files<'a>(&'a Contents);
+
+impl fmt::Display for Files<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0
+            .iter()
+            .try_for_each(|(slot, bytes)| write!(out, "/{:07}.txt-{bytes};", slot.number()))
+    }
+}
+
 /// An angle with two decimals.
 struct Degrees(Microdegrees);
 
@@ -390,6 +492,17 @@ impl fmt::Display for Degrees {
         let sign = if hundredths < 0 { "-" } else { "" };
         let magnitude = hundredths.unsigned_abs();
         write!(out, "{sign}{}.{:02}", magnitude / 100, magnitude % 100)
+    }
+}
+
+struct Host<'a>(Option<&'a str>);
+
+impl fmt::Display for Host<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(host) => write!(out, " Host:{host}.local"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -472,6 +585,20 @@ mod tests {
             said(|reply| reply.angles(HOME_ANGLES)),
             "ok S:135.00 E:45.00 P:135.00"
         );
+    }
+
+    #[test]
+    fn paper_lift_and_directions() {
+        let map = ZMap::new([0, 100, 300, -200]).unwrap();
+        let shift = NibShift::from_hundredths(-85).unwrap();
+        assert_eq!(
+            said(|reply| reply.compensation(map, shift)),
+            "ok S:0;100;300;-200 P:-0.85"
+        );
+        let directions = Directions {
+            reversed: [false, true, false],
+        };
+        assert_eq!(said(|reply| reply.directions(directions)), "ok S:1 E:2 P:1");
     }
 
     #[test]
@@ -601,16 +728,32 @@ mod tests {
     }
 
     #[test]
+    fn a_stopped_machine_says_how_to_go_on() {
+        assert_eq!(
+            said(|reply| reply.report(&Report::Stopped)),
+            "error INFO:\"the machine is stopped: send ~ on the serial line or press the button\""
+        );
+    }
+
+    #[test]
     fn every_token_of_the_diagnostics_has_a_colon() {
         let longest = MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap();
         let text = said(|reply| {
             reply.diagnostics(&Diagnostics {
                 name: &longest,
+                host: Some("abcdefghijklmnopqrstuvwxyz012345-9999"),
                 identity: Identity { mac: [0xff; 6] },
                 uptime: Micros::new(u64::MAX),
                 position: Position::from_units(-1950, -1950, 1000),
                 calibration: Calibration {
                     offsets: Angles::from_array([i32::MIN; 3].map(Microdegrees::new)),
+                },
+                compensation: &Compensation::new(
+                    ZMap::new([-500; 4]).unwrap(),
+                    NibShift::from_hundredths(-200).unwrap(),
+                ),
+                directions: Directions {
+                    reversed: [true; 3],
                 },
                 wifi: &Status {
                     setup: true,
@@ -630,11 +773,17 @@ mod tests {
                     }),
                 },
                 update_key: KeyName::Own([0xff; 4]),
+                space: Space {
+                    total: u32::MAX,
+                    used: 1_234_567_890,
+                },
                 last_panic: &"panicked at \"somewhere\"\n".repeat(9),
             });
         });
         assert!(
-            text.contains("one 4294967295\" LastPanic:\"panicked at 'somewhere'?")
+            text.contains(" FSTotal:4294967295 FSFree:3060399405 Memory:\"worn out,")
+                && text.contains("stored\" UpdateKey:ffffffff Update:\"refused: ")
+                && text.contains("one 4294967295\" LastPanic:\"panicked at 'somewhere'?")
                 && text.ends_with("...\""),
             "{text}"
         );
@@ -644,6 +793,58 @@ mod tests {
         assert_eq!(tokens.next(), Some("ok"));
         assert!(tokens.clone().count() >= 9);
         assert!(tokens.all(|token| token.contains(':')), "{text}");
+    }
+
+    #[test]
+    fn drawings_as_the_original_lists_them() {
+        let mut contents = Contents::EMPTY;
+        assert_eq!(said(|reply| reply.drawings(&contents)), "ok FS:\"\"");
+        let slot = |number| crate::drawings::Slot::new(number).unwrap();
+        contents.set(slot(1), Some(9496));
+        contents.set(slot(2), Some(11323));
+        assert_eq!(
+            said(|reply| reply.drawings(&contents)),
+            "ok FS:\"/0000001.txt-9496;/0000002.txt-11323;\""
+        );
+        // As many as there can be, each far longer than they can be together.
+        for slot in crate::drawings::Slot::all() {
+            contents.set(slot, Some(1_474_560));
+        }
+        let list = said(|reply| reply.drawings(&contents));
+        assert!(list.ends_with("/0000032.txt-1474560;\""), "{list}");
+        assert_eq!(list.matches(';').count(), 32);
+    }
+
+    #[test]
+    fn room_as_the_original_tells_it() {
+        let space = Space {
+            total: 1_562_625,
+            used: 356_922,
+        };
+        assert_eq!(
+            said(|reply| reply.space(space)),
+            "ok FSUsed:356922 FSTotal:1562625 FSFree:1205703 FSPercent:22"
+        );
+    }
+
+    #[test]
+    fn button_and_replay() {
+        let slot = crate::drawings::Slot::new(5).unwrap();
+        assert_eq!(said(|reply| reply.button(ButtonDraws::Next)), "ok S:1");
+        assert_eq!(
+            said(|reply| reply.button(ButtonDraws::Always(slot))),
+            "ok S:2 K:5"
+        );
+        assert_eq!(said(|reply| reply.replay(None)), "ok S:0");
+        let replay = Replay {
+            slot,
+            seconds: 20,
+            every: 600,
+        };
+        assert_eq!(
+            said(|reply| reply.replay(Some(replay))),
+            "ok S:20 P:600 K:5"
+        );
     }
 
     #[test]

@@ -1,14 +1,18 @@
 //! One connection: its bytes become requests, one reply each, in order.
 
 use super::command::{Command, parse};
+use super::recording;
 use super::refusal::Refusal;
 use super::reply::Reply;
+use crate::arm::{NibShift, ZMap};
+use crate::drawings::{ButtonDraws, Replay, Slot};
 use crate::machine::{Errand, Manner, Target};
 use crate::motion::{StepSize, Transform, WideCoordinate};
 use crate::settings::{AccessPointName, MachineName, StartMode};
-use crate::text::LineBuffer;
+use crate::text::{LineBuffer, MAX_LINE, Words};
 use crate::update::ManifestAddress;
 use crate::wifi::{Password, Ssid};
+use heapless::Vec;
 
 /// What a line asks for, in arm coordinates; each is answered by exactly one reply.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,6 +53,11 @@ pub enum Request {
         /// How its own network is called.
         name: Option<AccessPointName>,
     },
+    /// To be answered by [`Reply::own_network`].
+    OwnNetwork,
+    /// The password of the machine's own network, `None` for an open one; to be remembered, and answered by
+    /// [`Reply::ok`].
+    ProtectOwnNetwork(Option<Password>),
     /// To be answered by [`Reply::waves`].
     Waves,
     /// To be remembered, and answered by [`Reply::ok`].
@@ -72,14 +81,63 @@ pub enum Request {
     Update,
     /// To be remembered, and answered by [`Reply::ok`].
     SetUpdateAddress(Option<ManifestAddress>),
+    /// To be answered by [`Reply::drawings`].
+    Drawings,
+    /// To be answered by [`Reply::space`].
+    Space,
+    /// To be answered by [`Reply::button`].
+    Button,
+    /// To be remembered, and answered by [`Reply::ok`].
+    SetButton(ButtonDraws),
+    /// To be drawn from memory, and answered by [`Reply::ok`] when it begins.
+    Draw(Slot),
+    /// What is drawn from memory is to end, if anything is.
+    StopDrawing,
+    /// To be answered by [`Reply::ok`], and [`Session::record`] told when that is possible.
+    BeginRecording(Slot),
+    /// [`Session::recorded_line`] is to be kept, and answered by [`Reply::ok`].
+    RecordLine,
+    /// What was recorded is to become a drawing; [`Session::record`] is told. Comes when nothing is recorded
+    /// as well.
+    EndRecording,
+    /// To be deleted, and answered by [`Reply::ok`].
+    Delete(Slot),
+    /// To be answered by [`Reply::replay`].
+    Replaying,
+    /// To be answered by [`Reply::ok`].
+    SetReplay(Option<Replay>),
+    /// To be answered by [`Reply::compensation`].
+    Compensation,
+    /// To be remembered, and answered by [`Reply::ok`].
+    SetCompensation {
+        /// How high the paper lies.
+        map: Option<ZMap>,
+        /// How the nib moves as it comes down.
+        shift: Option<NibShift>,
+    },
+    /// Everything is to be forgotten; answered by [`Reply::ok`].
+    FactoryReset,
+    /// To be answered by [`Reply::directions`].
+    Directions,
+    /// To be remembered, and answered by [`Reply::ok`]: whether shoulder, elbow and pen turn the other
+    /// way.
+    SetDirections([Option<bool>; 3]),
 }
 
-/// What belongs to one connection: the line being received, scale and origin.
-#[derive(Debug)]
+/// What belongs to one connection: the line being received, scale and origin, and whether what comes is
+/// recorded instead of drawn.
+#[derive(Clone, Debug)]
 pub struct Session {
     lines: LineBuffer,
     transform: Transform,
+    recording: bool,
+    recorded: Vec<u8, MAX_LINE>,
+    /// It is a WebSocket, which is refused some commands.
+    web_socket: bool,
 }
+
+/// What WebSockets are refused (`reference/line-us.md`, section 1).
+const NOT_OVER_WEB_SOCKETS: [u32; 5] = [170, 171, 587, 588, 589];
 
 impl Default for Session {
     fn default() -> Self {
@@ -93,7 +151,36 @@ impl Session {
         Self {
             lines: LineBuffer::new(),
             transform: Transform::IDENTITY,
+            recording: false,
+            recorded: Vec::new(),
+            web_socket: false,
         }
+    }
+
+    /// A new WebSocket: the commands that such clients are refused, are refused.
+    pub const fn web_socket() -> Self {
+        Self {
+            lines: LineBuffer::new(),
+            transform: Transform::IDENTITY,
+            recording: false,
+            recorded: Vec::new(),
+            web_socket: true,
+        }
+    }
+
+    /// From now on, lines are recorded, or no longer.
+    pub const fn record(&mut self, on: bool) {
+        self.recording = on;
+    }
+
+    /// Whether lines are recorded.
+    pub const fn is_recording(&self) -> bool {
+        self.recording
+    }
+
+    /// The line of the last [`Request::RecordLine`], as it was sent, without its terminator.
+    pub fn recorded_line(&self) -> &[u8] {
+        &self.recorded
     }
 
     /// Takes bytes off the front of `input` up to the end of the next line, and gives what it asks
@@ -101,7 +188,18 @@ impl Session {
     /// in `reply`.
     pub fn next_request(&mut self, input: &mut &[u8], reply: &mut Reply) -> Option<Request> {
         let line = self.lines.next_line(input)?;
-        Some(match line.map_err(Refusal::from).and_then(parse) {
+        let web_socket = self.web_socket;
+        let line = line.map_err(Refusal::from).and_then(|line| {
+            if web_socket {
+                allowed(line)?;
+            }
+            Ok(line)
+        });
+        if self.recording {
+            return Some(recording::request(line, &mut self.recorded, reply));
+        }
+        let command = line.and_then(parse);
+        Some(match command {
             // By reference: commands are large, and copying one costs as much as reading it.
             Ok(command) => request(&mut self.transform, &command, reply),
             Err(refusal) => {
@@ -112,8 +210,22 @@ impl Session {
     }
 }
 
+fn allowed(line: &[u8]) -> Result<(), Refusal<'_>> {
+    match Words::new(line).code() {
+        Ok(Some((b'M', code))) if NOT_OVER_WEB_SOCKETS.contains(&code) => {
+            Err(Refusal::NotHere(code))
+        }
+        // What is wrong with it is found when it is parsed.
+        _ => Ok(()),
+    }
+}
+
 #[inline]
-fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Reply) -> Request {
+pub(super) fn request(
+    scale_and_origin: &mut Transform,
+    command: &Command,
+    reply: &mut Reply,
+) -> Request {
     match command {
         Command::Move(manner, axes) => {
             let [x, y, z] = axes.to_array();
@@ -152,6 +264,8 @@ fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Repl
         Command::Name => Request::Name,
         Command::Rename(name) => Request::Rename(name.clone()),
         Command::Start => Request::Start,
+        Command::OwnNetwork => Request::OwnNetwork,
+        Command::ProtectOwnNetwork(password) => Request::ProtectOwnNetwork(password.clone()),
         Command::SetStart { mode, name } => Request::SetStart {
             mode: *mode,
             name: *name,
@@ -167,6 +281,39 @@ fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Repl
         Command::ForgetAll => Request::ForgetAll,
         Command::Update => Request::Update,
         Command::SetUpdateAddress(address) => Request::SetUpdateAddress(address.clone()),
+        Command::Drawings => Request::Drawings,
+        Command::Space => Request::Space,
+        Command::Button => Request::Button,
+        Command::SetButton(choice) => Request::SetButton(*choice),
+        Command::Draw(slot) => Request::Draw(*slot),
+        Command::StopDrawing => Request::StopDrawing,
+        Command::Record(slot) => Request::BeginRecording(*slot),
+        Command::EndRecording => Request::EndRecording,
+        Command::Delete(slot) => Request::Delete(*slot),
+        Command::Replaying => Request::Replaying,
+        Command::SetReplay(replay) => Request::SetReplay(*replay),
+        Command::Dwell(duration) => Request::Errand(Errand::Dwell(*duration)),
+        Command::Compensation => Request::Compensation,
+        Command::SetCompensation { map, shift } => Request::SetCompensation {
+            map: *map,
+            shift: *shift,
+        },
+        Command::Uncalibrated(axes, bare) => {
+            let [x, y, z] = axes.to_array();
+            let here = match bare.xy {
+                true => Transform::IDENTITY,
+                false => *scale_and_origin,
+            };
+            let target = Target {
+                x: x.map(|x| here.x(x)),
+                y: y.map(|y| here.y(y)),
+                z: z.map(WideCoordinate::from_bits),
+            };
+            Request::Errand(Errand::Uncalibrated(target, *bare))
+        }
+        Command::FactoryReset => Request::FactoryReset,
+        Command::Directions => Request::Directions,
+        Command::SetDirections(servos) => Request::SetDirections(*servos),
     }
 }
 
@@ -174,6 +321,8 @@ fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Repl
 mod tests {
     extern crate std;
     use super::*;
+    use crate::machine::Bare;
+    use crate::motion::Micros;
     use crate::wifi::{Password, Ssid};
     use proptest::prelude::*;
     use std::string::{String, ToString};
@@ -307,9 +456,57 @@ mod tests {
             ("M552 P3", "P must be a whole number, 1 to 2"),
             ("M552 S1 S2", "parameter S is repeated"),
             ("M552 X1", "unknown parameter X"),
+            ("M589 S1", "unknown parameter S"),
+            ("M589 Pseven..", "P must be 8 to 63 bytes"),
+            ("M589 P", "P has no value"),
+            ("M589 P\"\" P\"\"", "parameter P is repeated"),
             ("M291 S3", "S must be a whole number, 1 to 2"),
             ("M291 S", "S has no number"),
             ("M291 S1 S1", "parameter S is repeated"),
+            ("G4", "parameter P is missing"),
+            ("G4 P-1", "P is out of range, 0 to 3600"),
+            ("G4 S3600.1", "S is out of range, 0 to 3600"),
+            ("G04 P1 S1", "parameter S is repeated"),
+            ("G4 P1 P1", "parameter P is repeated"),
+            ("G4 X1", "unknown parameter X"),
+            ("G4 P", "P has no number"),
+            ("G31 S", "S has no value"),
+            ("G31 S ;0;0;0;0", "S has no value"),
+            (
+                "G31 S0;100;300",
+                "S is '0;100;300', it may be 'clear' or four whole numbers, -500 to 500, as in 0;100;300;200",
+            ),
+            (
+                "G31 S0;100;300;501",
+                "S is '0;100;300;501', it may be 'clear' or four whole numbers, -500 to 500, as in 0;100;300;200",
+            ),
+            (
+                "G31 S0; 100; 300; 200",
+                "S is '0;', it may be 'clear' or four whole numbers, -500 to 500, as in 0;100;300;200",
+            ),
+            ("G31 S\"0;1", "S has no closing quote"),
+            ("G31 P2.01", "P is out of range, -2 to 2"),
+            ("G31 P-3", "P is out of range, -2 to 2"),
+            ("G31 P0.5mm", "unknown parameter M"),
+            ("G31 Sclear Sclear", "parameter S is repeated"),
+            ("G31 X0", "unknown parameter X"),
+            ("G40 Kx", "K is 'x', it may be 'xy' or 'z'"),
+            ("G40 K", "K has no value"),
+            ("G40 X1 Kxy Kz", "parameter K is repeated"),
+            ("G40 X1 X2", "parameter X is repeated"),
+            ("G40 F5", "unknown parameter F"),
+            ("G40 X1e9", "X is out of range, -1000000 to 1000000"),
+            ("M170", "M170 is reserved and does nothing here"),
+            ("m172 S1 ;x", "M172 is reserved and does nothing here"),
+            ("M171", "parameter S is missing"),
+            ("M171 Sconform", "S is 'conform', it may be 'confirm'"),
+            ("M171 Sconfirm S", "parameter S is repeated"),
+            ("M171 Pconfirm", "unknown parameter P"),
+            ("M280 S3", "S must be a whole number, 1 to 2"),
+            ("M280 E0", "E must be a whole number, 1 to 2"),
+            ("M280 P-1", "P must be a whole number, 1 to 2"),
+            ("M280 S1 S2", "parameter S is repeated"),
+            ("M280 Z1", "unknown parameter Z"),
             (
                 "M997 S\"https://a/b\"",
                 "S is 'https://a/b', an address is http://HOST[:PORT]/PATH, no more than 96 bytes",
@@ -435,9 +632,150 @@ mod tests {
             ("M552 S3", set(Some(StartMode::AccessPointLocked), None)),
             ("M552 S4.0", set(Some(StartMode::StationLongPress), None)),
             ("M552 P1", set(None, Some(AccessPointName::Setup))),
+            ("M589", Request::OwnNetwork),
+            (
+                "M589 P\"correct horse\"",
+                Request::ProtectOwnNetwork(Password::new(b"correct horse")),
+            ),
+            ("M589 P\"\"", Request::ProtectOwnNetwork(None)),
             ("M291", Request::Waves),
             ("M291 S1", Request::SetWaves(true)),
             ("M291 S2", Request::SetWaves(false)),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
+        }
+    }
+
+    #[test]
+    fn stored_drawings() {
+        let slot = |number| Slot::new(number).unwrap();
+        let replay = |seconds, every, number| {
+            Request::SetReplay(Some(Replay {
+                slot: slot(number),
+                seconds,
+                every,
+            }))
+        };
+        for (line, request) in [
+            ("M20", Request::Drawings),
+            ("M39 ", Request::Space),
+            ("M23", Request::Button),
+            ("M23 S0", Request::SetButton(ButtonDraws::Nothing)),
+            ("M23 S1", Request::SetButton(ButtonDraws::Next)),
+            (
+                "m23 k7 s2",
+                Request::SetButton(ButtonDraws::Always(slot(7))),
+            ),
+            ("M23 S3", Request::SetButton(ButtonDraws::Any)),
+            ("M23 K7", Request::Draw(slot(7))),
+            ("M23 K0", Request::StopDrawing),
+            ("M28 S1", Request::BeginRecording(slot(1))),
+            ("M28 S32", Request::BeginRecording(slot(32))),
+            ("M29", Request::EndRecording),
+            ("M30 S5", Request::Delete(slot(5))),
+            ("M85", Request::Replaying),
+            ("M85 S0", Request::SetReplay(None)),
+            ("M85 S20 P600 K3", replay(20, 600, 3)),
+            ("M85 S20", replay(20, Replay::DEFAULT_EVERY, 1)),
+            ("M85 K2", replay(30, Replay::DEFAULT_EVERY, 2)),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
+        }
+        for (line, reason) in [
+            ("M20 S1", "unknown parameter S"),
+            ("M23 S4", "S must be a whole number, 0 to 3"),
+            ("M23 S2", "parameter K is missing"),
+            ("M23 S2 K0", "K must be a whole number, 1 to 32"),
+            ("M23 K33", "K must be a whole number, 0 to 32"),
+            ("M23 S1 K3", "K goes with S2 only"),
+            ("M23 S1 S1", "parameter S is repeated"),
+            ("M28", "parameter S is missing"),
+            ("M28 S0", "S must be a whole number, 1 to 32"),
+            ("M28 S33", "S must be a whole number, 1 to 32"),
+            ("M28 S-1", "S must be a whole number, 1 to 32"),
+            ("M28 S1.5", "S must be a whole number, 1 to 32"),
+            ("M28 S", "S has no number"),
+            ("M28 K1", "unknown parameter K"),
+            ("M28 S1 S2", "parameter S is repeated"),
+            ("M30 S1e9", "S must be a whole number, 1 to 32"),
+            ("M30 S1 P1", "unknown parameter P"),
+            ("M85 S3601", "S must be a whole number, 0 to 3600"),
+            ("M85 S5 P0", "P must be a whole number, 1 to 3600"),
+            ("M85 S5 K0", "K must be a whole number, 1 to 32"),
+        ] {
+            let refused = std::format!("error INFO:\"{reason}\"");
+            assert_eq!(only(line), (Request::Answered, refused), "{line}");
+        }
+    }
+
+    #[test]
+    fn dwells_in_seconds() {
+        for (line, micros) in [
+            ("G4 P0.5", 500_000),
+            ("G4 S2", 2_000_000),
+            ("g04 p1e-3", 1_000),
+            ("G4 P0", 0),
+            ("G4 P3600", 3_600_000_000),
+            ("G4 P0.123456", 123_456),
+        ] {
+            let dwell = Errand::Dwell(Micros::new(micros));
+            assert_eq!(only(line).0, Request::Errand(dwell), "{line}");
+        }
+    }
+
+    #[test]
+    fn maps_and_shifts() {
+        let set = |map: Option<[i16; 4]>, hundredths: Option<i16>| Request::SetCompensation {
+            map: map.map(|corners| ZMap::new(corners).unwrap()),
+            shift: hundredths.map(|shift| NibShift::from_hundredths(shift).unwrap()),
+        };
+        for (line, request) in [
+            ("G31", Request::Compensation),
+            ("G31 ; how is it", Request::Compensation),
+            ("G31 S0;100;300;200", set(Some([0, 100, 300, 200]), None)),
+            ("g31 s-5;0;7;500 ; here", set(Some([-5, 0, 7, 500]), None)),
+            ("G31 S1;2;3;4(four)", set(Some([1, 2, 3, 4]), None)),
+            (
+                "G31 S\"0; 100; 300; 200\"",
+                set(Some([0, 100, 300, 200]), None),
+            ),
+            ("G31 Sclear", set(Some([0; 4]), None)),
+            ("G31 SCLEAR P0", set(Some([0; 4]), Some(0))),
+            ("G31 P0.85", set(None, Some(85))),
+            ("G31 P-1.234 S1;1;1;1", set(Some([1; 4]), Some(-123))),
+            ("G31 P2", set(None, Some(200))),
+        ] {
+            assert_eq!(only(line).0, request, "{line}");
+        }
+    }
+
+    #[test]
+    fn bare_moves_know_no_scale_and_origin() {
+        let mut session = Session::new();
+        let stream = b"G54 X100 Y0 S2\nG40 X900 Y300 Z5\nG40 X400 Y150 Kxy\nG40 Z7 Kz\nG40\n";
+        let found = requests(&mut session, stream);
+        let bare = |target, xy, z| Request::Errand(Errand::Uncalibrated(target, Bare { xy, z }));
+        for (found, expected) in found.iter().skip(1).zip([
+            bare(target(Some(900.0), Some(300.0), Some(5.0)), true, true),
+            bare(target(Some(900.0), Some(300.0), None), false, true),
+            bare(target(None, None, Some(7.0)), true, false),
+            bare(Target::default(), true, true),
+        ]) {
+            assert_eq!(found.0, expected);
+        }
+        assert_eq!(found.len(), 5);
+    }
+
+    #[test]
+    fn directions_and_the_factory_reset() {
+        let set = |servos| Request::SetDirections(servos);
+        for (line, request) in [
+            ("M280", Request::Directions),
+            ("M280 S2", set([Some(true), None, None])),
+            ("m280 p1 e2", set([None, Some(true), Some(false)])),
+            ("M171 Sconfirm", Request::FactoryReset),
+            ("M171 SCONFIRM", Request::FactoryReset),
+            ("m171 s\"Confirm\"", Request::FactoryReset),
         ] {
             assert_eq!(only(line).0, request, "{line}");
         }
@@ -514,6 +852,26 @@ mod tests {
             password: Password::new(&[b'"'; 63]),
         };
         assert_eq!(only(&line).0, request);
+    }
+
+    #[test]
+    fn websockets_are_refused_some_commands_by_name() {
+        for (line, code) in [
+            ("M170", 170),
+            ("m171 SCONFIRM", 171),
+            ("M587", 587),
+            ("M587 Shome P\"correct horse\"", 587),
+            ("(a) M0588 S*", 588),
+            ("M588 Q", 588),
+        ] {
+            let stream = std::format!("{line}\n");
+            let found = requests(&mut Session::web_socket(), stream.as_bytes());
+            let reason = std::format!("error INFO:\"M{code} is refused over the WebSocket\"");
+            assert_eq!(found, [(Request::Answered, reason)], "{line}");
+        }
+        let moves = requests(&mut Session::web_socket(), b"G01 X900 Y300 Z1\nM552\n");
+        assert_eq!(moves[0].0, straight(900.0, 300.0, 1.0));
+        assert_eq!(moves[1].0, Request::Start);
     }
 
     /// Lines that are nearly right, where the mistakes hide.

@@ -2,7 +2,7 @@
 
 extern crate std;
 use super::*;
-use crate::motion::contains;
+use crate::motion::{Coordinate, WideCoordinate, contains};
 
 const A: Client = Client(0);
 const B: Client = Client(1);
@@ -377,4 +377,97 @@ fn a_move_sent_during_a_wave_waits_for_its_end() {
     assert_eq!(machine.next_report(), None);
     run(&mut machine, 800, 800);
     assert_eq!(machine.next_report(), Some((A, moving(1000, 900, 0))));
+}
+
+#[test]
+fn a_dwell_takes_its_turn_and_its_time() {
+    let mut machine = arm();
+    machine.take(A, &line(1015, 1000, 1000));
+    let dwell = Errand::Dwell(Micros::from_millis(250));
+    assert_eq!(machine.take(A, &dwell), None);
+    run(&mut machine, 0, 10);
+    // It has begun, and is answered; what comes after it waits for its end.
+    assert_eq!(machine.next_report(), Some((A, moving(1015, 1000, 1000))));
+    assert_eq!(machine.take(A, &line(1030, 1000, 1000)), None);
+    let last = run(&mut machine, 20, 250);
+    assert_eq!(last.position, Position::from_units(1015, 1000, 1000));
+    assert!(last.moving && !last.held);
+    assert_eq!(machine.next_report(), None);
+    let last = run(&mut machine, 260, 270);
+    assert_eq!(machine.next_report(), Some((A, moving(1030, 1000, 1000))));
+    assert_eq!(last.position, Position::from_units(1030, 1000, 1000));
+}
+
+#[test]
+fn a_dwell_is_never_longer_than_an_hour_and_may_be_nothing() {
+    let mut machine = arm();
+    machine.take(A, &Errand::Dwell(Micros::new(u64::MAX)));
+    assert_eq!(machine.next_event(), Some(Micros::from_secs(3600)));
+    let mut machine = arm();
+    machine.take(A, &Errand::Dwell(Micros::default()));
+    assert_eq!(
+        machine.take(A, &line(1015, 1000, 1000)),
+        Some(moving(1015, 1000, 1000))
+    );
+}
+
+#[test]
+fn a_pen_left_down_rises_in_the_middle_of_a_dwell() {
+    let mut machine = arm();
+    machine.take(A, &line(1000, 1000, 0));
+    run(&mut machine, 0, 1000);
+    machine.take(B, &Errand::Dwell(Micros::from_secs(3600)));
+    machine.client_gone(A);
+    assert!(run(&mut machine, 1010, 5990).position.pen_is_down());
+    assert!(!run(&mut machine, 6000, 7000).position.pen_is_down());
+}
+
+#[test]
+fn a_stop_ends_a_dwell_and_answers_one_that_waits() {
+    let mut machine = arm();
+    machine.take(A, &Errand::Dwell(Micros::from_secs(10)));
+    machine.take(B, &Errand::Dwell(Micros::from_secs(10)));
+    run(&mut machine, 0, 100);
+    machine.stop(StopReason::Requested);
+    assert_eq!(machine.next_report(), Some((B, Report::Stopped)));
+    assert!(!machine.is_busy());
+    assert_eq!(
+        machine.take(A, &Errand::Dwell(Micros::default())),
+        Some(Report::Stopped)
+    );
+}
+
+#[test]
+fn an_errand_that_waits_can_be_taken_back_and_one_that_has_begun_cannot() {
+    let mut machine = arm();
+    let there = |x| line(x, 0, 1000);
+    assert!(machine.take(Client::JOB, &there(1200)).is_some());
+    assert_eq!(machine.take(Client::JOB, &there(1400)), None);
+    assert!(machine.withdraw(Client::JOB));
+    assert!(!machine.withdraw(Client::JOB));
+    let end = machine.next_event().unwrap();
+    machine.advance(end);
+    assert_eq!(machine.next_report(), None);
+    assert_eq!(machine.position(), Position::from_units(1200, 0, 1000));
+
+    machine.take(Client::JOB, &there(1400));
+    machine.take(Client::JOB, &there(1600));
+    let end = machine.next_event().unwrap();
+    machine.advance(end);
+    assert!(!machine.withdraw(Client::JOB));
+    assert!(matches!(
+        machine.next_report(),
+        Some((Client::JOB, Report::Moving { .. }))
+    ));
+}
+
+#[test]
+fn everybody_has_a_place_of_his_own() {
+    let network = (0..).map_while(Client::new);
+    let web = (0..).map_while(Client::web);
+    let others = [Client::SERIAL, Client::HOUSE, Client::JOB, Client::DRAWER];
+    let mut slots: std::vec::Vec<usize> =
+        network.chain(web).chain(others).map(Client::slot).collect();
+    slots.sort_unstable();
+    assert_eq!(slots, (0..MAX_ASKERS).collect::<std::vec::Vec<_>>());
 }

@@ -27,7 +27,7 @@ const INSET: i64 = 8;
 
 /// Whether a nib at (x, y) is inside the drawing area, edges included.
 #[inline]
-pub fn contains(x: Coordinate, y: Coordinate) -> bool {
+pub const fn contains(x: Coordinate, y: Coordinate) -> bool {
     let (x, y) = (x.bits(), y.bits());
     let wall = if y >= 0 { LEFT_WALL } else { RIGHT_WALL };
     // Far points first: the squares below are good for 2048 units.

@@ -67,20 +67,13 @@ impl Lamp {
         ),
         (
             Self::Error,
-            "red, three short flashes",
-            &[
-                flash(RED, 150),
-                flash(OFF, 150),
-                flash(RED, 150),
-                flash(OFF, 150),
-                flash(RED, 150),
-                flash(OFF, 1000),
-            ],
+            "red and white",
+            &[flash(RED, 500), flash(WHITE, 500)],
         ),
         (
             Self::Update,
-            "blue and white, slow",
-            &[flash(BLUE, 1000), flash(WHITE, 1000)],
+            "blue and white",
+            &[flash(BLUE, 500), flash(WHITE, 500)],
         ),
     ];
 

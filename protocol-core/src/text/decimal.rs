@@ -65,6 +65,34 @@ impl Decimal {
         Some((number, rest))
     }
 
+    /// -1, 0 or 1, as the value is below, at or above zero.
+    pub const fn sign(self) -> i32 {
+        match (self.mantissa, self.negative) {
+            (0, _) => 0,
+            (_, true) => -1,
+            (_, false) => 1,
+        }
+    }
+
+    /// The value, if it is a whole number that is not negative and fits.
+    pub fn whole(self) -> Option<u32> {
+        let whole = match (self.sign(), self.exponent) {
+            (0, _) => 0,
+            (-1, _) => return None,
+            (_, 0..) => {
+                let power = 10u64.checked_pow(self.exponent.unsigned_abs())?;
+                self.mantissa.checked_mul(power)?
+            }
+            _ => {
+                let power = 10u64.checked_pow(self.exponent.unsigned_abs())?;
+                self.mantissa
+                    .is_multiple_of(power)
+                    .then_some(self.mantissa / power)?
+            }
+        };
+        u32::try_from(whole).ok()
+    }
+
     /// The value times `2^fraction_bits`, rounded to the nearest whole number, halves away from
     /// zero.
     ///
@@ -214,6 +242,35 @@ mod tests {
         ] {
             let (_, left) = Decimal::read(text.as_bytes()).unwrap();
             assert_eq!(left, rest.as_bytes(), "{text}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_however_they_are_written() {
+        for (text, whole) in [
+            ("0", Some(0)),
+            ("-0", Some(0)),
+            ("0e400", Some(0)),
+            ("007", Some(7)),
+            ("54.", Some(54)),
+            ("54.0", Some(54)),
+            ("3E1", Some(30)),
+            ("300e-1", Some(30)),
+            ("4294967295", Some(u32::MAX)),
+            ("4294967296", None),
+            ("54.1", None),
+            ("1e-400", None),
+            ("1e400", None),
+            ("-1", None),
+        ] {
+            let (number, rest) = Decimal::read(text.as_bytes()).unwrap();
+            assert!(rest.is_empty(), "{text}");
+            assert_eq!(number.whole(), whole, "{text}");
+            assert_eq!(
+                number.sign() < 0,
+                text.starts_with("-1"),
+                "the sign of {text}"
+            );
         }
     }
 

@@ -17,7 +17,7 @@ pub const MAX_LINE: usize = 256;
 pub struct TooLong;
 
 /// Collects bytes until a line is complete.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
     bytes: Vec<u8, MAX_LINE>,
     too_long: bool,

@@ -180,6 +180,21 @@ impl<'a> Words<'a> {
         Err(WordError::OpenQuote(letter))
     }
 
+    /// The text after `letter`, quoted or up to the next blank, in which a `;` begins no comment: it
+    /// separates the parts of the value.
+    pub fn list(&mut self, letter: char) -> Result<Text<'a>, WordError<'a>> {
+        let end = self
+            .rest
+            .iter()
+            .position(|byte| separates(*byte) && *byte != b';');
+        let (raw, rest) = self.rest.split_at(end.unwrap_or(self.rest.len()));
+        if raw.is_empty() || raw.starts_with(b"\"") {
+            return self.text(letter);
+        }
+        self.rest = rest;
+        Ok(Text { raw, quoted: false })
+    }
+
     /// Nothing may follow `letter`.
     pub fn no_value(&mut self, letter: char) -> Result<(), WordError<'a>> {
         match token(self.rest) {

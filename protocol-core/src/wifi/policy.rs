@@ -11,7 +11,6 @@ use super::{Heard, Joined, MAX_NETWORKS, Network, Networks, SETUP_SSID, Ssid};
 use crate::motion::Micros;
 use crate::panel::{Gesture, Lamp};
 use crate::settings::{AccessPointName, Settings, StartMode};
-use core::cmp::Reverse;
 use core::fmt::Write;
 use heapless::{String, Vec};
 
@@ -39,6 +38,8 @@ pub enum Event<'a> {
     Elapsed,
     /// The button.
     Press(Gesture),
+    /// A short press of the button, and there is a drawing for it to draw.
+    PressToDraw,
     /// A client of the own network wants this network to be tried (`spec 1.0.4a, M587`).
     Try(Network),
     /// The remembered networks have changed (M587, M588).
@@ -58,8 +59,8 @@ pub enum Job<'a> {
     Stay,
     /// Nothing until then.
     Pause(Micros),
-    /// Open the machine's own network, without a password.
-    Open(&'a Ssid),
+    /// Open the machine's own network.
+    Open(&'a Network),
     /// Keep it open.
     Host,
 }
@@ -71,6 +72,8 @@ pub enum Effect {
     Remember(Network),
     /// Confirm the press of the button.
     Confirm,
+    /// The press was for the drawing: the network stays as it is.
+    Draw,
 }
 
 /// What a person or a program is told about the network.
@@ -112,7 +115,7 @@ enum State {
     /// Setup: listening for others who are in setup.
     LookingAround,
     /// Setup: opening the own network.
-    Opening(Ssid),
+    Opening(Network),
     /// Setup: the own network is open.
     Hosting,
     /// Setup: the own network could not be opened; once more later.
@@ -163,7 +166,7 @@ impl Policy {
             State::Joining(network) | State::Trying(network) => Job::Join(network),
             State::Waiting(until) | State::Failed(until) => Job::Pause(*until),
             State::Connected(_) => Job::Stay,
-            State::Opening(name) => Job::Open(name),
+            State::Opening(own) => Job::Open(own),
             State::Hosting => Job::Host,
         }
     }
@@ -228,6 +231,7 @@ impl Policy {
                 _ => {}
             },
             Event::Press(Gesture::Short) => return self.short_press(settings),
+            Event::PressToDraw => return self.press_to_draw(settings),
             Event::Press(Gesture::Long) => return self.long_press(settings),
             Event::Press(_) => {}
             Event::Try(network) => {
@@ -294,8 +298,10 @@ impl Policy {
             }
             State::LookingAround => {
                 // A radio that cannot listen may yet be able to talk.
-                let name = self.own_name(settings, heard.unwrap_or_default());
-                self.state = State::Opening(name);
+                self.state = State::Opening(Network {
+                    ssid: self.own_name(settings, heard.unwrap_or_default()),
+                    password: settings.own_password.clone(),
+                });
             }
             _ => {}
         }
@@ -379,6 +385,20 @@ impl Policy {
         Some(Effect::Confirm)
     }
 
+    /// Where the network waits for nothing, a press is for the drawing (`reference/line-us.md`, section 6).
+    fn press_to_draw(&mut self, settings: &Settings) -> Option<Effect> {
+        match &self.state {
+            State::Connected(_)
+            | State::LookingAround
+            | State::Opening(_)
+            | State::Hosting
+            | State::Failed(_) => Some(Effect::Draw),
+            State::Listening | State::Joining(_) | State::Waiting(_) | State::Trying(_) => {
+                self.short_press(settings)
+            }
+        }
+    }
+
     /// The networks as they are remembered, beginning after the one that is being tried.
     fn next_by_hand(&mut self, networks: &Networks) {
         let current = match &self.state {
@@ -443,14 +463,15 @@ fn order(heard: &[Heard], networks: &Networks) -> Vec<Ssid, MAX_NETWORKS> {
         let same = heard.iter().filter(|other| other.ssid == network.ssid);
         same.map(|other| other.signal_dbm).max()
     };
-    // Absent is less than any strength.
-    let mut order: Vec<_, MAX_NETWORKS> = networks
-        .iter()
-        .enumerate()
-        .map(|(place, network)| (Reverse(strength(network)), place, &network.ssid))
-        .collect();
-    order.sort_unstable_by_key(|(strength, place, _)| (*strength, *place));
-    order.iter().map(|(.., ssid)| (*ssid).clone()).collect()
+    // Put in place one by one: eight are not worth the 10 kB of a library's sorting. Absent is less than
+    // any strength, and there are as many places as networks.
+    let mut order = Vec::<_, MAX_NETWORKS>::new();
+    for network in networks.iter() {
+        let strength = strength(network);
+        let place = order.iter().position(|(other, _)| *other < strength);
+        let _ = order.insert(place.unwrap_or(order.len()), (strength, &network.ssid));
+    }
+    order.iter().map(|(_, ssid)| (*ssid).clone()).collect()
 }
 
 #[cfg(test)]

@@ -195,6 +195,11 @@ impl HandTime {
         (next != u64::MAX).then(|| embassy_time::Instant::from_ticks(next))
     }
 
+    /// Nobody waits for an alarm any more.
+    pub fn forget_alarms(&self) {
+        Self::with(|hand| hand.alarms = Queue::new());
+    }
+
     /// Goes on to `time`, or stays where it is if that is past, and rings the alarms that are due.
     pub fn go_on_to(&self, time: embassy_time::Instant) {
         Self::with(|hand| {

@@ -28,6 +28,17 @@ impl Outcome {
     pub const fn is_clean(&self) -> bool {
         self.errors == 0 && !self.failed
     }
+
+    /// One more reply.
+    pub(super) const fn count(&mut self, is_error: bool) {
+        self.commands += 1;
+        self.errors += is_error as u64;
+    }
+
+    /// The file could not be read to its end.
+    pub(super) const fn fail(&mut self) {
+        self.failed = true;
+    }
 }
 
 /// The file as a client: it sends a line at a time, and hears the replies.
@@ -45,20 +56,25 @@ pub struct Script {
 /// # Errors
 /// When it cannot be read.
 pub fn open(path: &Path, bar: ProgressBar) -> io::Result<(Script, Rc<RefCell<Outcome>>)> {
-    let file = File::open(path)?;
-    if file.metadata()?.is_dir() {
-        return Err(io::Error::other("is a folder"));
-    }
-    bar.set_length(file.metadata()?.len());
+    let file = open_file(path, &bar)?;
     let outcome = Rc::new(RefCell::new(Outcome::default()));
     let script = Script {
-        file: BufReader::new(file),
+        file,
         bar,
         outcome: outcome.clone(),
         ended: false,
         in_line: false,
     };
     Ok((script, outcome))
+}
+
+pub(super) fn open_file(path: &Path, bar: &ProgressBar) -> io::Result<BufReader<File>> {
+    let file = File::open(path)?;
+    if file.metadata()?.is_dir() {
+        return Err(io::Error::other("is a folder"));
+    }
+    bar.set_length(file.metadata()?.len());
+    Ok(BufReader::new(file))
 }
 
 impl ErrorType for Script {
@@ -108,13 +124,13 @@ impl Write for Script {
         if message.starts_with("hello ") {
             return Ok(bytes.len());
         }
-        outcome.commands += 1;
+        let is_error = message.starts_with("error");
+        outcome.count(is_error);
         let info = message
             .split_once("INFO:")
             .map(|(_, info)| info.trim_matches('"'));
-        match (message.starts_with("error"), info) {
+        match (is_error, info) {
             (true, info) => {
-                outcome.errors += 1;
                 let line = outcome.line;
                 self.bar
                     .suspend(|| eprintln!("line {line}: {}", info.unwrap_or(message)));

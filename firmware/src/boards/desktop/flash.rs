@@ -9,8 +9,10 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::Path;
 
-/// Bytes of the flash, all for settings.
+/// Bytes of the flash for settings.
 pub const SIZE: u32 = 8 * 4096;
+/// Bytes of the flash for drawings, as many as the chips have.
+pub const DRAWINGS_SIZE: u32 = 360 * 4096;
 
 /// A flash chip whose contents live in a file, or in memory only.
 #[derive(Debug)]
@@ -50,41 +52,54 @@ impl From<io::Error> for FlashError {
 }
 
 impl FileFlash {
-    /// Opens the flash in a file, which is made if it does not exist.
+    /// Opens the flash of `size` bytes in a file, which is made if it does not exist.
     ///
     /// # Errors
     /// When the file cannot be read and written, or is of another size than this flash: then it is
     /// something else, and stays as it is.
-    pub fn open(path: &Path) -> io::Result<Self> {
+    pub fn open(path: &Path, size: u32) -> io::Result<Self> {
         if !path.exists() {
             // Whole or not at all.
             let folder = path
                 .parent()
                 .filter(|folder| !folder.as_os_str().is_empty());
             let mut new = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))?;
-            new.write_all(&vec![0xff; SIZE as usize])?;
+            new.write_all(&vec![0xff; size as usize])?;
             new.persist(path).map_err(|error| error.error)?;
         }
         let file = OpenOptions::new().read(true).write(true).open(path)?;
-        if file.metadata()?.len() != u64::from(SIZE) {
+        if file.metadata()?.len() != u64::from(size) {
             return Err(io::Error::other(
                 "is not the state of an arm, and stays as it is",
             ));
         }
         let mut contents = Vec::new();
-        (&file).take(SIZE.into()).read_to_end(&mut contents)?;
+        (&file).take(size.into()).read_to_end(&mut contents)?;
         Ok(Self {
             contents,
             file: Some(file),
         })
     }
 
-    /// A flash that is forgotten with the program.
-    pub fn in_memory() -> Self {
+    /// A flash of `size` bytes that is forgotten with the program.
+    pub fn in_memory(size: u32) -> Self {
         Self {
-            contents: vec![0xff; SIZE as usize],
+            contents: vec![0xff; size as usize],
             file: None,
         }
+    }
+
+    /// The same with something in it; `None` unless it is as much as the flash has room for.
+    pub fn holding(contents: Vec<u8>) -> Option<Self> {
+        (contents.len() == SIZE as usize).then_some(Self {
+            contents,
+            file: None,
+        })
+    }
+
+    /// Everything that is in it.
+    pub fn contents(&self) -> &[u8] {
+        &self.contents
     }
 
     fn change(
@@ -123,7 +138,7 @@ impl ReadNorFlash for FileFlash {
     }
 
     fn capacity(&self) -> usize {
-        SIZE as usize
+        self.contents.len()
     }
 }
 

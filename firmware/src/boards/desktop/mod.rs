@@ -1,11 +1,15 @@
 //! The arm nobody needs hardware for: the firmware's tasks on a desktop, with real sockets, a file
 //! for flash, and a picture of what the servos did.
 
+pub mod air;
 pub mod canvas;
 pub mod clock;
 pub mod draw;
+pub mod draw_lasaur;
 pub mod flash;
+pub mod imprint;
 pub mod net;
+pub mod pty;
 pub mod recorder;
 
 use crate::board::{Address, Vitals};

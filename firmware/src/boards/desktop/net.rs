@@ -1,10 +1,11 @@
 //! The desktop's sockets, without Nagle's delay: each reply leaves at once, in its own segment. A client
 //! that has vanished without a word is noticed by keep-alive probes.
 
-use core::net::SocketAddr;
-use edge_nal::{TcpAccept, TcpBind};
-use edge_nal_std::{Stack, TcpAcceptor, TcpSocket};
-use socket2::{SockRef, TcpKeepalive};
+use crate::services::discovery::{GROUP, PORT};
+use core::net::{IpAddr, Ipv4Addr, SocketAddr};
+use edge_nal::{TcpAccept, TcpBind, UdpBind};
+use edge_nal_std::{Stack, TcpAcceptor, TcpSocket, UdpSocket};
+use socket2::{Domain, Protocol, SockRef, Socket, TcpKeepalive, Type};
 use std::io;
 use std::time::Duration;
 
@@ -23,7 +24,7 @@ impl Listener {
     /// # Errors
     /// When it is taken, or not this computer's.
     pub async fn bind(address: SocketAddr) -> io::Result<Self> {
-        Stack::new().bind(address).await.map(Self)
+        TcpBind::bind(&Stack::new(), address).await.map(Self)
     }
 }
 
@@ -37,5 +38,59 @@ impl TcpAccept for Listener {
         options.set_tcp_nodelay(true)?;
         options.set_tcp_keepalive(&KEEP_ALIVE)?;
         Ok((peer, socket))
+    }
+}
+
+/// Multicast on one of this computer's networks, on a port that other programs may have as well.
+#[derive(Clone, Copy, Debug)]
+pub struct Multicast(Ipv4Addr);
+
+impl Multicast {
+    /// On the network where clients connect to `address`; where that is any of the computer's, on the one
+    /// that its multicasts take.
+    ///
+    /// # Errors
+    /// When the address is one of IPv6, or there is no network.
+    pub fn beside(address: IpAddr) -> io::Result<Self> {
+        match address {
+            IpAddr::V4(address) if !address.is_unspecified() => Ok(Self(address)),
+            IpAddr::V4(any) => {
+                // Nothing is sent by that.
+                let probe = std::net::UdpSocket::bind((any, 0))?;
+                probe.connect((GROUP, PORT))?;
+                match probe.local_addr()?.ip() {
+                    IpAddr::V4(address) => Ok(Self(address)),
+                    IpAddr::V6(_) => Err(io::ErrorKind::AddrNotAvailable.into()),
+                }
+            }
+            IpAddr::V6(_) => Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "clients find the arm at an address of IPv4 only",
+            )),
+        }
+    }
+
+    /// This computer's address on that network.
+    pub const fn address(&self) -> Ipv4Addr {
+        self.0
+    }
+}
+
+impl UdpBind for Multicast {
+    type Error = io::Error;
+    type Socket<'a> = UdpSocket;
+
+    async fn bind(&self, local: SocketAddr) -> io::Result<UdpSocket> {
+        let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
+        socket.set_reuse_address(true)?;
+        #[cfg(unix)]
+        socket.set_reuse_port(true)?;
+        socket.bind(&local.into())?;
+        socket.set_multicast_if_v4(&self.0)?;
+        // RFC 6762, section 11.
+        socket.set_multicast_ttl_v4(255)?;
+        socket.set_ttl_v4(255)?;
+        let socket = async_io::Async::new(std::net::UdpSocket::from(socket))?;
+        Ok(UdpSocket::new(socket))
     }
 }

@@ -4,7 +4,9 @@
 use super::canvas::{Canvas, Point, Trail};
 use super::clock;
 use crate::board::Servos;
-use protocol_core::machine::{ArmData, SetPoint, position_of};
+use crate::services::arm::Arm;
+use protocol_core::arm::Compensation;
+use protocol_core::machine::{ArmData, SetPoint, nib_of};
 use protocol_core::motion::{Micros, PulseWidth};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -61,7 +63,7 @@ impl Totals {
 }
 
 enum Entry {
-    Frame(Micros, SetPoint),
+    Frame(Micros, SetPoint, Compensation),
     End,
 }
 
@@ -70,6 +72,19 @@ pub struct RecordedServos {
     entries: SyncSender<Entry>,
     /// Whether time may jump is up to the arm's motion here.
     hurry_while_moving: bool,
+    /// Whose paper and lift the picture knows.
+    arm: Option<&'static Arm>,
+}
+
+impl RecordedServos {
+    /// The servos of this arm: what the paper and the lift make of the pulses is drawn.
+    #[must_use]
+    pub fn of(self, arm: &'static Arm) -> Self {
+        Self {
+            arm: Some(arm),
+            ..self
+        }
+    }
 }
 
 impl Servos for RecordedServos {
@@ -78,7 +93,13 @@ impl Servos for RecordedServos {
             clock::hurry(set_point.moving);
         }
         // A recorder that has ended, because the program does, needs no more frames.
-        let _ = self.entries.send(Entry::Frame(time, *set_point));
+        let compensation = self
+            .arm
+            .map(|arm| arm.with(|machine| *machine.compensation()));
+        let compensation = compensation.unwrap_or_default();
+        let _ = self
+            .entries
+            .send(Entry::Frame(time, *set_point, compensation));
     }
 }
 
@@ -104,6 +125,7 @@ impl Recorder {
         let servos = RecordedServos {
             entries: entries.clone(),
             hurry_while_moving,
+            arm: None,
         };
         Ok((Self { thread, entries }, servos))
     }
@@ -131,6 +153,8 @@ struct Recording {
     reported: Totals,
     /// A frame at rest that has not been written.
     skipped: Option<(Micros, SetPoint)>,
+    /// What the plotter's outputs are said to be.
+    switched: [bool; 3],
     last_moving: Micros,
     unsaved: bool,
     saved: Instant,
@@ -162,6 +186,7 @@ impl Recording {
             totals: Totals::default(),
             reported: Totals::default(),
             skipped: None,
+            switched: [false; 3],
             last_moving: Micros::default(),
             unsaved: false,
             saved: Instant::now(),
@@ -171,21 +196,32 @@ impl Recording {
 
     fn run(mut self, entries: &Receiver<Entry>) -> io::Result<Totals> {
         let mut previous = None;
-        while let Ok(Entry::Frame(time, set_point)) = entries.recv() {
+        while let Ok(Entry::Frame(time, set_point, compensation)) = entries.recv() {
             if set_point.moving {
                 let frame = time - previous.unwrap_or(time);
                 self.totals.moving += Duration::from_micros(frame.get());
             }
             let written = if set_point.moving || previous.is_none() {
-                self.moving(time, &set_point)
+                self.moving(time, &set_point, &compensation)
             } else {
                 self.resting(time, set_point)
             };
             self.note(written);
+            self.tell_outputs(set_point.outputs);
             previous = Some(time);
         }
         self.save()?;
         Ok(self.totals)
+    }
+
+    fn tell_outputs(&mut self, outputs: [bool; 3]) {
+        let names = ["air assist", "aux1", "aux2"];
+        for ((name, now), before) in names.iter().zip(outputs).zip(&mut self.switched) {
+            if *before != now {
+                log::info!("{name} is {}", if now { "on" } else { "off" });
+                *before = now;
+            }
+        }
     }
 
     /// The arm draws on without a file; it is tried again when it rests, and told once.
@@ -200,7 +236,12 @@ impl Recording {
         }
     }
 
-    fn moving(&mut self, time: Micros, set_point: &SetPoint) -> io::Result<()> {
+    fn moving(
+        &mut self,
+        time: Micros,
+        set_point: &SetPoint,
+        compensation: &Compensation,
+    ) -> io::Result<()> {
         // Where the motion began.
         if let Some((time, set_point)) = self.skipped.take() {
             self.row(time, &set_point)?;
@@ -208,7 +249,7 @@ impl Recording {
         self.row(time, set_point)?;
         self.last_moving = time;
 
-        let place = position_of(set_point.pulses, &self.data);
+        let place = nib_of(set_point.pulses, &self.data, compensation);
         let point = (place.x.to_f64(), place.y.to_f64());
         let trail = if place.pen_is_down() {
             Trail::Ink

@@ -50,6 +50,14 @@ pub struct Board {
     pub button_pin: u8,
     /// UART0, towards a computer: 57600 8N1.
     pub serial: SerialPort,
+    /// Air assist, aux1 and aux2 of the serial dialect (M80 to M85), high when on.
+    pub outputs: [Option<u8>; 3],
+    /// The door's switch.
+    pub door_open: Option<InputPort>,
+    /// The chiller's alarm.
+    pub chiller_off: Option<InputPort>,
+    /// The loss of the servos' supply; it stops the arm.
+    pub power_off: Option<InputPort>,
     /// Pins of this chip that a board must not use: flash, USB, and so on.
     pub reserved_pins: &'static [u8],
 }
@@ -131,6 +139,24 @@ pub struct SerialPort {
     pub rx: u8,
 }
 
+/// An input of the serial dialect.
+pub struct InputPort {
+    /// Signal pin.
+    pub pin: u8,
+    /// High says that the door is open, or chiller or power off; else low does. The pull is towards the
+    /// other level.
+    pub set_when_high: bool,
+}
+
+impl InputPort {
+    const fn pin(port: &Option<Self>) -> Option<u8> {
+        match port {
+            Some(port) => Some(port.pin),
+            None => None,
+        }
+    }
+}
+
 /// Nonsense in a board file stops the build, not the arm.
 const _: () = check(&BOARD);
 
@@ -169,6 +195,12 @@ const fn check(board: &Board) {
         Some(board.button_pin),
         Some(board.serial.tx),
         Some(board.serial.rx),
+        board.outputs[0],
+        board.outputs[1],
+        board.outputs[2],
+        InputPort::pin(&board.door_open),
+        InputPort::pin(&board.chiller_off),
+        InputPort::pin(&board.power_off),
     ];
     let mut i = 0;
     while i < pins.len() {

@@ -6,6 +6,7 @@ use esp_println as _;
 
 pub mod data;
 pub mod flash;
+pub mod inputs;
 pub mod interface;
 pub mod last_panic;
 pub mod light;

@@ -17,7 +17,7 @@ use super::pulse_clock::PulseClock;
 use super::pwm_timer::{self, COUNTER_BITS, OverflowFrames, SERVO_TIMER, SOURCE_HZ};
 use crate::board;
 use embassy_time::Duration;
-use esp_hal::gpio::{AnyPin, DriveMode};
+use esp_hal::gpio::{AnyPin, DriveMode, Level, Output, OutputConfig};
 use esp_hal::ledc::LowSpeed;
 use esp_hal::ledc::channel::{self, Channel, ChannelHW, ChannelIFace};
 use esp_hal::ledc::timer::{self, TimerIFace};
@@ -51,12 +51,14 @@ const CHANNELS: [channel::Number; 3] = [
 /// What [`Servos`] is made of. Unlike `Servos` it may be sent to the task of the servo tick.
 pub struct ServoPorts {
     pub(super) pins: [AnyPin<'static>; 3],
+    pub(super) outputs: [Option<AnyPin<'static>>; 3],
     pub(super) power: PwmPower,
 }
 
-/// The servo outputs.
+/// The servo outputs, and those of M80 to M85.
 pub struct Servos {
     channels: [Channel<'static, LowSpeed>; 3],
+    outputs: [Option<Output<'static>>; 3],
 }
 
 impl ServoPorts {
@@ -87,7 +89,10 @@ impl ServoPorts {
             idle(CHANNELS[1], elbow, timer),
             idle(CHANNELS[2], pen, timer),
         ];
-        (Servos { channels }, OverflowFrames::listen())
+        let off = |pin| Output::new(pin, Level::Low, OutputConfig::default());
+        let outputs = self.outputs.map(|pin| pin.map(off));
+        let servos = Servos { channels, outputs };
+        (servos, OverflowFrames::listen())
     }
 }
 
@@ -119,5 +124,10 @@ impl board::Servos for Servos {
                 channel.set_duty_hw(CLOCK.counts(pulse));
             }
         });
+        for (output, on) in self.outputs.iter_mut().zip(set_point.outputs) {
+            if let Some(output) = output {
+                output.set_level(if on { Level::High } else { Level::Low });
+            }
+        }
     }
 }

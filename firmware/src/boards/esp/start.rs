@@ -3,6 +3,7 @@
 use super::Button;
 use super::data::{BOARD, UPDATE_NAME};
 use super::flash::{self, Chip, FlashPartition};
+use super::inputs::Inputs;
 use super::interface::Interfaces;
 use super::light::{Light, PwmPower};
 use super::net::{Net, NetRunner};
@@ -50,8 +51,12 @@ pub struct Parts {
     pub button: Button,
     /// G-code from the computer; `None` if the port could not be opened.
     pub serial: Option<(SerialRx, SerialTx)>,
+    /// Door, chiller and power, as far as the board has them.
+    pub inputs: Inputs,
     /// Flash for the settings; `None` if the partition table has no such place.
     pub settings: Option<FlashPartition>,
+    /// Flash for drawings; `None` if the partition table has no such place.
+    pub drawings: Option<FlashPartition>,
     /// Radio and network stack; `None` if they could not be started.
     pub network: Option<Network>,
     /// The slots for firmware, and how the one that runs stands; `None` if the partition table has no two.
@@ -77,8 +82,8 @@ pub fn parts() -> Parts {
     let timers = TimerGroup::new(chip.TIMG0);
     let mut watchdog = Watchdog::new(timers.wdt);
     watchdog.start(PATIENCE_AT_START);
-    let names = ["settings", "otadata", "ota_0", "ota_1"];
-    let ([settings, choice, first, second], running) = flash::open(chip.FLASH, names);
+    let names = ["settings", "drawings", "otadata", "ota_0", "ota_1"];
+    let ([settings, drawings, choice, first, second], running) = flash::open(chip.FLASH, names);
     let slots = match (choice, first, second) {
         (Some(choice), Some(first), Some(second)) => {
             Some(firmware_slots(choice, [first, second], running))
@@ -101,6 +106,7 @@ pub fn parts() -> Parts {
             pin(BOARD.elbow.pin),
             pin(BOARD.pen.pin),
         ],
+        outputs: BOARD.outputs.map(|output| output.map(pin)),
         power,
     };
 
@@ -124,7 +130,9 @@ pub fn parts() -> Parts {
         light: Light::new(&BOARD.light, chip.RMT, power),
         button: Input::new(pin(BOARD.button_pin), pull_up),
         serial: serial.ok(),
+        inputs: Inputs::open(),
         settings,
+        drawings,
         network,
         slots,
         watchdog,

@@ -55,6 +55,8 @@ pub struct Devices {
     pub recorder: world::Recorder,
     /// Where the host's lines come from.
     pub lines: world::Lines,
+    /// The two ends of the serial port.
+    pub serial: (uart::Receiver, uart::Transmitter),
 }
 
 /// Finds the devices and lets them interrupt; call once, first of all. `None` when one is missing.
@@ -77,12 +79,14 @@ pub fn start() -> Option<Devices> {
             _ => {}
         }
     }
+    let serial = uart::init();
     interrupts::enable();
     Some(Devices {
         card: card?,
         disk: disk?,
         recorder: recorder?,
         lines: lines?,
+        serial,
     })
 }
 

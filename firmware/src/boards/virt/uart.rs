@@ -10,7 +10,7 @@ use core::{
 
 use critical_section::Mutex;
 use embassy_sync::{blocking_mutex::raw::CriticalSectionRawMutex, pipe::Pipe};
-use embedded_io_async::{ErrorType, Read, Write};
+use embedded_io_async::{Error, ErrorKind, ErrorType, Read, Write};
 use uart_16550::{
     BaudRate, Config, Uart16550,
     backend::MmioBackend,
@@ -54,7 +54,7 @@ pub fn init() -> (Receiver, Transmitter) {
     };
     critical_section::with(|cs| PORT.borrow_ref_mut(cs).init(config)).expect("16550");
     plic::enable(map::UART_SOURCE);
-    (Receiver(()), Transmitter(()))
+    (Receiver { told: 0 }, Transmitter(()))
 }
 
 /// Bytes that came when [`BUFFER`] was full and are lost.
@@ -92,14 +92,40 @@ fn feed(port: &mut Uart16550<MmioBackend>) {
 }
 
 /// Receiving end of the port.
-pub struct Receiver(());
+pub struct Receiver {
+    /// Overruns that have been told.
+    told: u32,
+}
+
+/// A byte was lost; the next ones can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overrun;
+
+impl core::fmt::Display for Overrun {
+    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        out.write_str("a byte was lost")
+    }
+}
+
+impl core::error::Error for Overrun {}
+
+impl Error for Overrun {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Other
+    }
+}
 
 impl ErrorType for Receiver {
-    type Error = Infallible;
+    type Error = Overrun;
 }
 
 impl Read for Receiver {
-    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
+    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
+        let lost = overruns();
+        if self.told != lost {
+            self.told = lost;
+            return Err(Overrun);
+        }
         Ok(RECEIVED.read(buffer).await)
     }
 }

@@ -11,14 +11,16 @@ pub const PATIENCE: Duration = Duration::from_secs(2);
 const RETRY: Duration = Duration::from_millis(100);
 
 /// The way of replies to one client: whole, in order, each in one write as long as it reads.
-pub(super) struct Answers<S> {
+/// `N` is the length of the longest one.
+pub struct Answers<S, const N: usize = MAX_REPLY> {
     link: Link<S>,
     /// The rest of a reply of which only a part went out: it comes before anything else.
-    rest: heapless::Vec<u8, MAX_REPLY>,
+    rest: heapless::Vec<u8, N>,
 }
 
-impl<S: Read + Write> Answers<S> {
-    pub(super) const fn new(socket: S) -> Self {
+impl<S: Read + Write, const N: usize> Answers<S, N> {
+    /// To a client that has just come.
+    pub const fn new(socket: S) -> Self {
         Self {
             link: Link {
                 socket,
@@ -30,7 +32,7 @@ impl<S: Read + Write> Answers<S> {
     }
 
     /// Reads what the client has sent, and meanwhile sees to what it has not yet taken.
-    pub(super) async fn read(&mut self, chunk: &mut [u8]) -> Result<usize, S::Error> {
+    pub async fn read(&mut self, chunk: &mut [u8]) -> Result<usize, S::Error> {
         while !self.rest.is_empty() && !self.link.gone {
             if let Ok(read) = with_timeout(RETRY, self.link.socket.read(chunk)).await {
                 return read;
@@ -45,14 +47,19 @@ impl<S: Read + Write> Answers<S> {
         self.rest.drain(..sent);
     }
 
-    pub(super) async fn send(&mut self, reply: &Reply) {
+    /// Sends a reply with its terminator.
+    pub async fn send(&mut self, reply: &Reply) {
+        self.send_message(reply.as_bytes()).await;
+    }
+
+    /// Sends a message.
+    pub async fn send_message(&mut self, message: &[u8]) {
         if !self.rest.is_empty() {
             self.send_rest().await;
             if !self.rest.is_empty() {
                 return;
             }
         }
-        let message = reply.as_bytes();
         let sent = self.link.push(message).await;
         if let Some(rest @ [_, ..]) = message.get(sent..)
             && sent > 0

@@ -4,13 +4,15 @@
 //! takes the next client, says so, and closes. What a slow client loses is its own replies.
 
 mod answers;
+mod drawings;
 mod perform;
 
+pub(super) use answers::Answers;
 pub use answers::PATIENCE;
+pub(super) use perform::perform;
 
 use super::House;
 use crate::log::info;
-use answers::Answers;
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use core::sync::atomic::{AtomicU8, Ordering};
 use edge_nal::{Close, TcpAccept, TcpShutdown};
@@ -20,8 +22,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
-use perform::perform;
-use protocol_core::lineus::{Reply, Session};
+use protocol_core::lineus::{Reply, Request, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 
 /// The port of Line-us.
@@ -60,14 +61,14 @@ impl Server {
                 Timer::after_millis(10).await;
                 continue;
             };
-            self.count(1);
+            self.count(1, house);
             info!("client {} connected", peer);
             house.greet_first_client().await;
             serve(&mut socket, client, house).await;
             // It may be gone already; then there is nothing to close.
             let _ = with_timeout(FAREWELL, socket.close(Close::Both)).await;
             info!("client {} left", peer);
-            self.count(-1);
+            self.count(-1, house);
         }
     }
 
@@ -88,11 +89,12 @@ impl Server {
         }
     }
 
-    fn count(&self, change: i8) {
+    fn count(&self, change: i8, house: &House) {
         // Workers share one executor: nobody comes in between.
         let busy = self.busy.load(Ordering::Relaxed);
-        self.busy
-            .store(busy.saturating_add_signed(change), Ordering::Relaxed);
+        let busy = busy.saturating_add_signed(change);
+        self.busy.store(busy, Ordering::Relaxed);
+        house.clients.store(busy, Ordering::Relaxed);
         self.changed.signal(());
     }
 }
@@ -110,18 +112,32 @@ async fn farewell<S: Read + Write + TcpShutdown>(socket: &mut S) -> Result<(), S
     Ok(())
 }
 
+/// Does what a line of a connection asks for, and puts the answer into `reply`. At its end, the connection
+/// abandons what it was recording: [`Drawings::abandon`](super::drawings::Drawings::abandon).
+pub async fn answer(
+    request: &Request,
+    session: &mut Session,
+    reply: &mut Reply,
+    client: Client,
+    house: &House,
+) {
+    if !drawings::record(request, session, reply, client, house).await {
+        perform(request, reply, client, house).await;
+    }
+}
+
 /// Serves one connection until its client has closed it and everything received is executed.
 pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     let mut session = Session::new();
     let mut reply = Reply::new();
-    let mut answers = Answers::new(socket);
+    let mut answers: Answers<_> = Answers::new(socket);
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
     while let Ok(length @ 1..) = answers.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
-            perform(&request, &mut reply, client, house).await;
+            answer(&request, &mut session, &mut reply, client, house).await;
             answers.send(&reply).await;
         }
         // A client that sends faster than it is served would else keep everybody waiting.
@@ -129,5 +145,6 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
             yield_now().await;
         }
     }
+    house.drawings.abandon(client).await;
     house.arm.with(|machine| machine.client_gone(client));
 }

@@ -1,5 +1,6 @@
 //! What a line asks for is done here.
 
+use super::drawings;
 use crate::services::House;
 use crate::services::update::KEY_NAME;
 use core::fmt::Display;
@@ -10,7 +11,7 @@ use protocol_core::settings::{MachineName, Settings};
 use protocol_core::wifi::{Full, Heard, MAX_NETWORKS, Network, Networks, Password, Ssid};
 
 /// Does what a line asks for, and puts the answer into `reply`.
-pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &House) {
+pub async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &House) {
     let arm = &house.arm;
     match request {
         Request::Answered => {}
@@ -39,6 +40,14 @@ pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client
                 Ok(())
             };
             change("start mode", set, reply, client, house).await;
+        }
+        Request::OwnNetwork => house.settings(|settings| reply.own_network(settings)),
+        Request::ProtectOwnNetwork(password) => {
+            let set = |settings: &mut Settings| {
+                settings.own_password = password.clone();
+                Ok(())
+            };
+            change("password", set, reply, client, house).await;
         }
         Request::Waves => reply.waves(house.settings(|settings| settings.waves)),
         Request::SetWaves(on) => {
@@ -74,21 +83,74 @@ pub(super) async fn perform(request: &Request, reply: &mut Reply, client: Client
             };
             change("address", set, reply, client, house).await;
         }
+        Request::Drawings
+        | Request::Space
+        | Request::Draw(_)
+        | Request::StopDrawing
+        | Request::BeginRecording(_)
+        | Request::RecordLine
+        | Request::EndRecording
+        | Request::Delete(_)
+        | Request::Replaying
+        | Request::SetReplay(_) => drawings::perform(request, reply, client, house).await,
+        Request::Button => reply.button(house.settings(|settings| settings.button)),
+        Request::SetButton(choice) => {
+            let set = |settings: &mut Settings| {
+                settings.button = *choice;
+                Ok(())
+            };
+            change("choice", set, reply, client, house).await;
+        }
+        Request::Compensation => {
+            house.settings(|settings| reply.compensation(settings.map, settings.shift));
+        }
+        Request::SetCompensation { map, shift } => {
+            let set = |settings: &mut Settings| {
+                settings.map = map.unwrap_or(settings.map);
+                settings.shift = shift.unwrap_or(settings.shift);
+                Ok(())
+            };
+            change("map", set, reply, client, house).await;
+        }
+        Request::Directions => reply.directions(house.settings(|settings| settings.directions)),
+        Request::SetDirections(servos) => {
+            let set = |settings: &mut Settings| {
+                let now = settings.directions.reversed;
+                let pairs = servos.iter().zip(now);
+                let mut new = pairs.map(|(new, now)| new.unwrap_or(now));
+                settings.directions.reversed = now.map(|now| new.next().unwrap_or(now));
+                Ok(())
+            };
+            change("direction", set, reply, client, house).await;
+        }
+        Request::FactoryReset => match house.forget_everything().await {
+            Ok(()) => reply.ok(),
+            Err(error) => refuse_store("factory reset", &error, reply),
+        },
         Request::Calibrate => calibrate(true, reply, client, house).await,
         Request::ClearCalibration => calibrate(false, reply, client, house).await,
     }
 }
 
 fn diagnose(reply: &mut Reply, house: &House) {
-    let (position, calibration) = house
-        .arm
-        .with(|machine| (machine.position(), machine.calibration()));
+    let (position, calibration, compensation, directions) = house.arm.with(|machine| {
+        let compensation = *machine.compensation();
+        (
+            machine.position(),
+            machine.calibration(),
+            compensation,
+            machine.directions(),
+        )
+    });
     reply.diagnostics(&Diagnostics {
         name: &house.name(),
+        host: house.discovery.host().as_deref(),
         identity: house.identity,
         uptime: Micros::new(house.uptime().as_micros()),
         position,
         calibration,
+        compensation: &compensation,
+        directions,
         wifi: &house.wifi.status(),
         networks: house.settings(|settings| settings.networks.len()),
         free_memory: (house.vitals.free_memory)(),
@@ -96,6 +158,7 @@ fn diagnose(reply: &mut Reply, house: &House) {
         memory: house.store.health().text(),
         update: &house.update.status(),
         update_key: KEY_NAME,
+        space: house.drawings.space(),
         last_panic: house.vitals.last_panic,
     });
 }
@@ -190,13 +253,7 @@ async fn change<'a>(
 
 /// Makes the place where the arm rests the calibration point, or removes the calibration.
 async fn calibrate(here: bool, reply: &mut Reply, client: Client, house: &House) {
-    let calibrated = house.change(client, |settings| {
-        settings.calibration = match here {
-            true => house.arm.with(|machine| machine.calibration_here()),
-            false => Default::default(),
-        };
-    });
-    match calibrated.await {
+    match house.calibrate(here, client).await {
         Ok(()) => reply.ok(),
         Err(error) => refuse_store("calibration", &error, reply),
     }

@@ -3,12 +3,10 @@
 //! `sequential-storage` looks at the marks at the beginning and the end of each page, and where the marks
 //! of pages contradict each other it repairs, which erases pages. In these views nothing contradicts.
 
+use core::ops::Range;
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-
-/// Any flash's word, and a divisor of any page.
-pub(super) const LONGEST_WORD: usize = 32;
 
 /// Bytes that are written at once, and how long a page's mark is.
 pub(super) const fn word<F: NorFlash>() -> usize {
@@ -44,8 +42,8 @@ pub(super) struct Page<'a, F> {
 }
 
 impl<'a, F: NorFlash> Page<'a, F> {
-    /// Bytes of the page and the one that is always erased.
-    pub(super) const SIZE: u32 = 2 * F::ERASE_SIZE as u32;
+    /// The page and the one that is always erased.
+    pub(super) const RANGE: Range<u32> = 0..2 * F::ERASE_SIZE as u32;
 
     /// The page at `start`.
     pub(super) const fn new(flash: &'a mut F, start: u32, access: Access) -> Self {
@@ -79,7 +77,7 @@ impl<F: NorFlash> ReadNorFlash for Page<'_, F> {
     }
 
     fn capacity(&self) -> usize {
-        Self::SIZE as usize
+        2 * F::ERASE_SIZE
     }
 }
 

@@ -163,8 +163,12 @@ fn crossing_the_notch_is_held() {
 
 #[test]
 fn frames_between_steps() {
+    let far_off = Fitting {
+        offsets_deg: [1.8, 0.0, 180.0],
+        ..Fitting::NONE
+    };
     // 20 units down at 5: 4 steps, 40 ms. Frames of 7 ms, the last one at rest.
-    let all: Vec<Step> = frames_calibrated("G1 Z0\nG1 X1020", 7_000, [1.8, 0.0, 180.0]).collect();
+    let all: Vec<Step> = frames_fitted("G1 Z0\nG1 X1020", 7_000, far_off).collect();
     let end = 10_000 * (67 + 4);
     assert_eq!(all.last().unwrap().time_us, 714_000);
     assert!(
@@ -182,4 +186,33 @@ fn frames_between_steps() {
         (s.pulses_us[0] - pulse(s.angles_deg[0]) - 20.0).abs() < 1e-9 && s.pulses_us[2] == 2500.0
     );
     assert_eq!(frames("G1 Z0", 1_000_000).count(), 2);
+}
+
+#[test]
+fn a_dwell_stays_for_its_time() {
+    let all: Vec<Report> = reports("G1 X1015\nG4 P0.5\nG4 S0.0015\nG1 X1000").collect();
+    let ends: Vec<u64> = all.iter().map(|report| report.end_us).collect();
+    assert_eq!(ends, [10_000, 510_000, 511_500, 521_500]);
+    assert_eq!(all[2].target, [1015.0, 1000.0, 1000.0]);
+}
+
+#[test]
+fn a_bare_move_tells_the_servos_what_an_exact_arm_is_told() {
+    let odd = Fitting {
+        offsets_deg: [3.0, -2.0, 1.0],
+        map: [0.0, 100.0, 300.0, 200.0],
+        shift_mm: 0.85,
+    };
+    let last = |program| frames_fitted(program, STEP_US, odd).last().unwrap();
+    let told = |x, y, z| inverse(x, y, z).map(pulse);
+    assert!(near(
+        last("G40 X1400 Y-300 Z700").pulses_us,
+        told(1400.0, -300.0, 700.0)
+    ));
+    // What is left out stays.
+    let step = last("G40 X1400 Y-300 Z700\nG54 S2 X9\nG40 Y200");
+    assert!(near([step.pulses_us[0], step.pulses_us[1], 0.0], {
+        let [s, e, _] = told(1400.0, 200.0, 0.0);
+        [s, e, 0.0]
+    }));
 }

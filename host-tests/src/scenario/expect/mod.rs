@@ -38,7 +38,7 @@ pub fn expect(
             if stage.board.air.own().as_ref() == Some(ssid) {
                 // This network has been noticed.
                 let mut opened = stage.board.radio.opened.borrow_mut();
-                if opened.front() == Some(ssid) {
+                if opened.front().is_some_and(|own| own.ssid == *ssid) {
                     opened.pop_front();
                 }
             }
@@ -72,8 +72,15 @@ pub fn expect(
             let off = stage.pass_time(patience, |stage| !stage.board.power.is_on())?;
             off.then_some(()).ok_or("power is on".into())
         }
+        Expectation::IsFound(host) => {
+            let found = stage.pass_time(patience, |stage| stage.board.found_as() == *host)?;
+            let now = || stage.board.found_as().unwrap_or("nothing".into());
+            found
+                .then_some(())
+                .ok_or_else(|| format!("it is found as {}", now()))
+        }
         Expectation::Remembers(what) => remembers(&stage.board.remembered(), what),
-        Expectation::Opens(_)
+        Expectation::Opens(..)
         | Expectation::ClosesItsNetwork
         | Expectation::Tries(..)
         | Expectation::MayTry(_)

@@ -2,7 +2,7 @@
 
 use crate::scenario::command::{Expectation, Outcome};
 use crate::scenario::stage::Stage;
-use crate::scripted::radio::shown;
+use crate::scripted::radio::{offered, shown};
 use embassy_time::Duration;
 use protocol_core::wifi::Joined;
 
@@ -12,12 +12,12 @@ pub fn expect(
     patience: Duration,
 ) -> Result<(), String> {
     match expectation {
-        Expectation::Opens(ssid) => {
+        Expectation::Opens(ssid, password) => {
             let record = stage.board.radio.clone();
             stage.pass_time(patience, |_| !record.opened.borrow().is_empty())?;
             match record.opened.borrow_mut().pop_front() {
-                Some(opened) if opened == *ssid => Ok(()),
-                Some(other) => Err(format!("the machine opens {}", shown(&other))),
+                Some(own) if own.ssid == *ssid && own.password == *password => Ok(()),
+                Some(other) => Err(format!("the machine opens {}", offered(&other))),
                 None => Err("the machine opens no network".into()),
             }
         }

@@ -2,9 +2,10 @@ extern crate std;
 
 use super::*;
 use crate::arm::Angles;
+use crate::drawings::Slot;
 use crate::motion::Microdegrees;
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Networks, Password, Ssid};
-use proptest::array::uniform3;
+use proptest::array::{uniform3, uniform4};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -29,26 +30,51 @@ fn networks() -> impl Strategy<Value = Networks> {
 }
 
 fn settings() -> impl Strategy<Value = Settings> {
-    let numbers = (1..=4u8, 1..=2u8, any::<bool>());
+    let button = any::<[u8; 2]>().prop_map(|[number, slot]| {
+        let choice = ButtonDraws::from_bytes([number % 4, slot % 33]);
+        choice.unwrap_or_default()
+    });
+    let numbers = (1..=4u8, 1..=2u8, any::<bool>(), button);
+    let fitting = (uniform4(-500..=500i16), -200..=200i16, 0..8u8);
+    let origin = prop_oneof!["", "\\*", "https?://[a-z0-9.-]{1,40}(:[0-9]{1,5})?"];
     let address = option::of("http://[a-z0-9]{1,20}(:[1-9][0-9]{0,3})?/[a-z0-9._/-]{0,60}");
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
-        address,
+        (
+            option::of(vec(any::<u8>(), 8..=63)),
+            fitting,
+            origin,
+            address,
+        ),
     )
         .prop_map(
-            |(name, offsets, networks, (start, access_point, waves), address)| Settings {
-                name: MachineName::new(&name).unwrap(),
-                calibration: Calibration {
-                    offsets: Angles::from_array(offsets.map(Microdegrees::new)),
-                },
+            |(
+                name,
+                offsets,
                 networks,
-                start: StartMode::from_number(start).unwrap(),
-                access_point: AccessPointName::from_number(access_point).unwrap(),
-                waves,
-                update_address: address.map(|text| ManifestAddress::new(&text).unwrap()),
+                (start, access_point, waves, button),
+                (own, (map, shift, servos), origin, address),
+            )| {
+                Settings {
+                    name: MachineName::new(&name).unwrap(),
+                    calibration: Calibration {
+                        offsets: Angles::from_array(offsets.map(Microdegrees::new)),
+                    },
+                    networks,
+                    start: StartMode::from_number(start).unwrap(),
+                    access_point: AccessPointName::from_number(access_point).unwrap(),
+                    own_password: own.map(|phrase| Password::new(&phrase).unwrap()),
+                    waves,
+                    button,
+                    map: ZMap::new(map).unwrap(),
+                    shift: NibShift::from_hundredths(shift).unwrap(),
+                    directions: Directions::from_byte(servos).unwrap(),
+                    allowed_origin: AllowedOrigin::new(&origin).unwrap(),
+                    update_address: address.map(|text| ManifestAddress::new(&text).unwrap()),
+                }
             },
         )
 }
@@ -139,6 +165,12 @@ fn the_bytes_of_a_record() {
         \x04\x01\x04\
         \x05\x01\x02\
         \x06\x01\x00\
+        \x07\x08\x00\xffsecret\
+        \x10\x02\x02\x07\
+        \x18\x08\0\0\x64\0\x2c\x01\x38\xff\
+        \x19\x02\xab\xff\
+        \x1a\x01\x02\
+        \x08\x13https://example.org\
         \x20\x0ahttp://a/b";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
@@ -156,6 +188,13 @@ fn the_bytes_of_a_record() {
     assert!(!settings.waves);
     let address = settings.update_address.as_ref().unwrap();
     assert_eq!(address.as_str(), "http://a/b");
+    assert_eq!(settings.button, ButtonDraws::Always(Slot::new(7).unwrap()));
+    let password = settings.own_password.as_ref().unwrap();
+    assert_eq!(password.as_bytes(), b"\x00\xffsecret");
+    assert_eq!(settings.map.corners(), [0, 100, 300, -200]);
+    assert_eq!(settings.shift.hundredths(), -85);
+    assert_eq!(settings.directions.reversed, [false, true, false]);
+    assert_eq!(settings.allowed_origin.as_str(), "https://example.org");
 }
 
 #[test]
@@ -163,6 +202,9 @@ fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
         update_address: ManifestAddress::new(&std::format!("http://a/{:x<87}", "")),
+        own_password: Password::new(&[0xff; MAX_PASSWORD]),
+        allowed_origin: AllowedOrigin::new(&std::format!("http://{}", "x".repeat(MAX_ORIGIN - 7)))
+            .unwrap(),
         ..Settings::default()
     };
     for number in 0..MAX_NETWORKS {
@@ -207,6 +249,15 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x05\x01\x03",
         b"\x06\x01\x02",
         b"\x06\x00",
+        b"\x07\x00",
+        b"\x07\x07seven..",
+        b"\x18\x07\0\0\0\0\0\0\0",
+        b"\x18\x08\0\0\0\0\0\0\xf5\x01",
+        b"\x19\x02\xc9\x00",
+        b"\x19\x01\x00",
+        b"\x1a\x01\x08",
+        b"\x08\x04null",
+        b"\x08\x01\xff",
         b"\x20\x00",
         b"\x20\x03ftp",
     ] {

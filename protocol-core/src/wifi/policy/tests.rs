@@ -70,7 +70,14 @@ impl Bench {
             Job::Join(network) => std::format!("join {}", name(&network.ssid)),
             Job::Stay => "stay".to_string(),
             Job::Pause(until) => std::format!("pause {}", (until - NOW).get() / 1_000_000),
-            Job::Open(own) => std::format!("open {}", name(own)),
+            Job::Open(own) => match &own.password {
+                None => std::format!("open {}", name(&own.ssid)),
+                Some(password) => std::format!(
+                    "open {}, {}",
+                    name(&own.ssid),
+                    StdString::from_utf8_lossy(password.as_bytes())
+                ),
+            },
             Job::Host => "host".to_string(),
         }
     }
@@ -93,6 +100,23 @@ impl Bench {
         assert_eq!(bench.job(), "host");
         bench
     }
+}
+
+#[test]
+fn the_own_network_has_the_password_that_is_set_when_it_is_opened() {
+    let mut settings = settings(&[]);
+    settings.own_password = Password::new(b"battery staple");
+    let mut bench = Bench::new(settings);
+    bench.hears(&[]);
+    assert_eq!(bench.job(), "open Line-us-Setup, battery staple");
+    bench.on(Event::Opened(true));
+    // Guests are not thrown out.
+    bench.settings.own_password = None;
+    bench.on(Event::Changed);
+    assert_eq!(bench.job(), "host");
+    bench.on(Event::Restart);
+    bench.hears(&[]);
+    assert_eq!(bench.job(), "open Line-us-Setup");
 }
 
 #[test]
@@ -199,6 +223,32 @@ fn presses_in_the_network_and_in_setup() {
     bench.press(Gesture::Short);
     assert_eq!(bench.job(), "host");
     bench.press(Gesture::Long);
+    assert_eq!(bench.policy.lamp(), Lamp::Setup);
+}
+
+#[test]
+fn with_a_drawing_to_draw_a_press_leaves_the_network_alone() {
+    let mut bench = Bench::connected(&["home"]);
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Draw));
+    assert_eq!(bench.job(), "stay");
+    let mut bench = Bench::hosting(settings(&["home"]));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Draw));
+    assert_eq!(bench.job(), "host");
+    let mut bench = Bench::new(settings(&[]));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Draw));
+    assert_eq!(bench.job(), "scan");
+}
+
+#[test]
+fn while_a_network_is_looked_for_a_press_is_about_that() {
+    let mut bench = Bench::new(settings(&["home", "work"]));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Confirm));
+    assert_eq!(bench.job(), "join home");
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Confirm));
+    assert_eq!(bench.job(), "join work");
+    let mut bench = Bench::hosting(settings(&[]));
+    bench.on(Event::Try(network("new")));
+    assert_eq!(bench.on(Event::PressToDraw), Some(Effect::Confirm));
     assert_eq!(bench.policy.lamp(), Lamp::Setup);
 }
 
@@ -346,7 +396,7 @@ fn forgetting_everything_starts_anew() {
 }
 
 fn any_event() -> impl Strategy<Value = u8> {
-    0..14u8
+    0..15u8
 }
 
 proptest! {
@@ -376,6 +426,7 @@ proptest! {
                 9 => Event::Press(Gesture::Short),
                 10 => Event::Press(Gesture::Long),
                 11 => Event::Try(network("new")),
+                14 => Event::PressToDraw,
                 12 => {
                     bench.settings.networks.clear();
                     Event::Changed

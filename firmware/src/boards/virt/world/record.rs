@@ -38,7 +38,7 @@ pub struct Frame {
     /// How long after its time it came, in us.
     pub late_us: u32,
     /// Bit 0: held at the edge of the drawing area; bit 1: moving; bit 2: the tick found the processor
-    /// asleep, so that it was late by the emulator's fault.
+    /// asleep, so that it was late by the emulator's fault; bits 3 to 5: air, aux1, aux2 are on.
     pub flags: u8,
 }
 

@@ -28,10 +28,14 @@ impl board::Servos for Servos {
             set_point.position.y,
             set_point.position.z,
         ];
+        let [air, aux1, aux2] = set_point.outputs;
         let flags = [
             set_point.held,
             set_point.moving,
             executor::woken_from_sleep(),
+            air,
+            aux1,
+            aux2,
         ];
         record(Record::Servo(Frame {
             time_us: time.get(),
