@@ -3,11 +3,13 @@
 //! Network: edge-nal's `TcpAccept` and `UdpBind`. Memory: embedded-storage-async's `NorFlash`. Button:
 //! embedded-hal-async's `Wait`. Time: an embassy-time driver. The rest is here.
 
+use embedded_storage_async::nor_flash::{MultiwriteNorFlash, NorFlash};
 use heapless::Vec;
 use protocol_core::lasaur::Sensors;
 use protocol_core::machine::SetPoint;
 use protocol_core::motion::Micros;
 pub use protocol_core::panel::Colour;
+use protocol_core::update::Slot;
 use protocol_core::wifi::{Heard, Joined, Network};
 
 /// The three servos.
@@ -93,6 +95,33 @@ pub trait Address {
     /// Takes 192.168.4.1, the address of the machine on its own network, and gives its guests
     /// addresses, for ever.
     async fn serve_guests(&self) -> !;
+}
+
+/// The two places in flash for firmware, and the choice between them.
+#[expect(
+    async_fn_in_trait,
+    reason = "awaited in place by the update service alone, so no bound is missing"
+)]
+pub trait FirmwareSlots {
+    /// The flash of a slot.
+    type Slot: NorFlash;
+    /// The flash of the boot choice, two pages of 4 kB.
+    type Choice: MultiwriteNorFlash;
+
+    /// What manifests call this board.
+    fn board(&self) -> &'static str;
+
+    /// The slot that runs.
+    fn running(&self) -> Slot;
+
+    /// The flash of the other slot; addresses count from its beginning.
+    fn other(&mut self) -> &mut Self::Slot;
+
+    /// The flash of the boot choice; addresses count from its beginning.
+    fn choice(&mut self) -> &mut Self::Choice;
+
+    /// Starts the firmware of the slot that is chosen now.
+    async fn restart(&mut self) -> !;
 }
 
 /// What a plotter's controller senses: door, chiller, power, limit switches. An input that a board does

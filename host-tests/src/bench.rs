@@ -7,6 +7,7 @@ use protocol_core::lineus::{Diagnostics, Identity, Reply, Request, Session};
 use protocol_core::machine::{ArmData, Client, Errand, MAX_CLIENTS, Machine, Report, SetPoint};
 use protocol_core::motion::{Micros, Steps};
 use protocol_core::settings::{MachineName, Settings};
+use protocol_core::update;
 use protocol_core::wifi::{Networks, Phase, Status};
 use std::array;
 
@@ -191,6 +192,8 @@ impl Bench {
                 free_memory: 0,
                 reset_reason: "a test",
                 memory: "none",
+                update: &update::Status::NONE,
+                update_key: update::KeyName::Development,
                 space: Space::default(),
                 last_panic: "",
             }),
@@ -222,7 +225,9 @@ impl Bench {
             | Request::SetWaves(_)
             | Request::Remember { .. }
             | Request::Forget(_)
-            | Request::ForgetAll => reply.ok(),
+            | Request::ForgetAll
+            | Request::SetUpdateAddress(_) => reply.ok(),
+            Request::Update => reply.error(format_args!("{}", update::Rejection::NoSlots)),
             Request::Compensation => {
                 let now = self.machine.compensation();
                 reply.compensation(now.map(), now.shift());

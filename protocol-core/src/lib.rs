@@ -21,4 +21,5 @@ pub mod motion;
 pub mod panel;
 pub mod settings;
 pub mod text;
+pub mod update;
 pub mod wifi;

@@ -9,6 +9,7 @@ pub use record::MAX_RECORD;
 
 use crate::arm::{Calibration, Compensation, Directions, NibShift, ZMap};
 use crate::drawings::ButtonDraws;
+use crate::update::ManifestAddress;
 use crate::wifi::{Networks, Password};
 use heapless::String;
 
@@ -140,6 +141,8 @@ pub struct Settings {
     pub directions: Directions,
     /// Whose pages may drive the arm through its web interface, beside its own.
     pub allowed_origin: AllowedOrigin,
+    /// Where updates are asked for (M997).
+    pub update_address: Option<ManifestAddress>,
 }
 
 impl Settings {
@@ -161,6 +164,7 @@ impl Default for Settings {
             access_point: AccessPointName::default(),
             own_password: None,
             waves: true,
+            update_address: None,
             button: ButtonDraws::default(),
             map: ZMap::FLAT,
             shift: NibShift::NONE,

@@ -77,6 +77,19 @@ impl Board {
         Ok(file)
     }
 
+    /// Builds the firmware as of another version, and gives a file that the next build does not overwrite.
+    pub fn build_version(self, version: &str, setup: bool) -> Result<PathBuf> {
+        let mut cargo = self.cargo("build", &[], setup)?;
+        cargo.env("QUILL_VERSION", version);
+        run(cargo.args(["--bin", self.binary()]))?;
+        let mut file = target_dir();
+        file.extend(self.target());
+        file.extend([self.profile(), self.binary()]);
+        let copy = file.with_file_name(format!("{}-{version}", self.binary()));
+        std::fs::copy(&file, &copy).with_context(|| file.display().to_string())?;
+        Ok(copy)
+    }
+
     /// Looks for what clippy finds in the library and the given binaries.
     pub fn lint(self, binaries: &[&str], extra_features: &[&str], setup: bool) -> Result<()> {
         let mut cargo = self.cargo("clippy", extra_features, setup)?;

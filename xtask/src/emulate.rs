@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 use xtask::board::Board;
-use xtask::emulator::{Emulator, Options, Time};
+use xtask::emulator::{Emulator, Options, RESTART, Time};
 use xtask::records::Record;
 
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -32,15 +32,28 @@ pub fn emulate(options: Emulate, setup: bool) -> Result<()> {
         picture: Some(options.picture.clone()),
     };
     let (recorder, mut servos) = Recorder::start(outputs, ArmData::default(), false)?;
-    let mut emulator = Emulator::boot(&firmware, &machine)?;
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;
     println!("picture: {}; stop with Ctrl-C", options.picture.display());
     let typed = read_keyboard();
     let addresses = (options.line_us, options.web);
-    let outcome = follow(&mut emulator, &mut servos, addresses, &typed);
-    drop(emulator);
+    let outcome = loop {
+        let mut emulator = Emulator::boot(&firmware, &machine)?;
+        match follow(&mut emulator, &mut servos, addresses, &typed) {
+            Ok(Ended::Restart) => println!("the machine starts again"),
+            Ok(Ended::Stopped) => break Ok(()),
+            Err(error) => break Err(error),
+        }
+    };
     recorder.finish()?;
     outcome
+}
+
+/// How a run of the machine ended.
+enum Ended {
+    /// By the person.
+    Stopped,
+    /// By the firmware, which wants to be started again.
+    Restart,
 }
 
 fn follow(
@@ -48,11 +61,14 @@ fn follow(
     servos: &mut RecordedServos,
     (line_us, web): (SocketAddr, SocketAddr),
     typed: &std::sync::mpsc::Receiver<String>,
-) -> Result<()> {
+) -> Result<Ended> {
     let mut shown = [[0; 3]; 2];
     while !STOP.load(Ordering::Relaxed) {
         let Ok(next) = emulator.next_line(Duration::from_millis(50)) else {
             let status = emulator.wait_off(Duration::from_secs(1))?;
+            if status.code() == Some(RESTART) {
+                return Ok(Ended::Restart);
+            }
             bail!("the machine has switched itself off: {status}");
         };
         if let Some(line) = next {
@@ -79,7 +95,7 @@ fn follow(
             }
         }
     }
-    Ok(())
+    Ok(Ended::Stopped)
 }
 
 /// Lines that are typed; at the end of the input there are no more.

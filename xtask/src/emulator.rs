@@ -2,6 +2,7 @@
 //! its button and light, and every pulse of its servos.
 
 use crate::records::{self, Record};
+use crate::slots;
 use anyhow::{Context, Result, bail};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -23,6 +24,10 @@ pub const FLASH_SIZE: u64 = 4 << 20;
 const RECORDS: &str = "records";
 const CONSOLE: &str = "console";
 const MONITOR: &str = "monitor";
+const IMAGE: &str = "image";
+
+/// Exit status of a machine that wants to be started again.
+pub const RESTART: i32 = 102;
 
 /// How to start the machine.
 #[derive(Clone, Debug)]
@@ -65,7 +70,8 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Switches the machine on.
+    /// Switches the machine on, with the firmware of the chosen slot. As long as that is the first one, and
+    /// no update has been written there, it is `firmware`.
     pub fn boot(firmware: &Path, options: &Options) -> Result<Self> {
         if !options.flash.exists() {
             let erased = vec![0xff; FLASH_SIZE as usize];
@@ -76,6 +82,14 @@ impl Emulator {
         let records = folder.path().join(RECORDS);
         File::create(&records)?;
         let listener = UnixListener::bind(folder.path().join(CONSOLE))?;
+        let image = folder.path().join(IMAGE);
+        let firmware = match slots::image(&options.flash)? {
+            Some(bytes) => {
+                std::fs::write(&image, bytes)?;
+                &image
+            }
+            None => firmware,
+        };
         let qemu = command(firmware, options, folder.path())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -140,7 +154,8 @@ impl Emulator {
         &self.seen
     }
 
-    /// Says something to the machine's surroundings: `button down`, `button up`, `panic`.
+    /// Says something to the machine's surroundings: `button down`, `button up`, `panic`,
+    /// `hang`.
     pub fn say(&mut self, line: &str) -> Result<()> {
         Ok(writeln!(self.console, "{line}")?)
     }

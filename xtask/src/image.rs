@@ -6,6 +6,19 @@ use std::path::{Path, PathBuf};
 use xtask::board::{Board, own_cargo, root, run, target_dir};
 use xtask::emulator::FLASH_SIZE;
 use xtask::ready::{self, Owner};
+use xtask::slots;
+
+/// Builds the firmware and gives what goes into a slot.
+pub fn slot_image(board: Board, setup: bool) -> Result<Vec<u8>> {
+    if board == Board::Virt {
+        let firmware = board.build(board.binary(), &[], setup)?;
+        return slots::flatten(&firmware);
+    }
+    let mut file = image(board, &Owner::default(), setup)?.into_os_string();
+    file.push(".app");
+    let file = PathBuf::from(file);
+    fs::read(&file).with_context(|| file.display().to_string())
+}
 
 /// Builds the firmware and makes the file.
 pub fn image(board: Board, owner: &Owner, setup: bool) -> Result<PathBuf> {

@@ -5,5 +5,7 @@ pub mod board;
 pub mod emulator;
 pub mod ready;
 pub mod records;
+pub mod release;
 pub mod size;
+pub mod slots;
 pub mod toolchain;

@@ -6,15 +6,17 @@ mod image;
 mod table;
 mod test;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
+use protocol_core::update::Version;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 use xtask::bench;
-use xtask::board::{Board, run};
+use xtask::board::{Board, root, run};
 use xtask::emulator::QEMU;
 use xtask::ready::Owner;
+use xtask::release;
 use xtask::toolchain::require;
 
 /// Build, emulate, flash, measure and test the firmware.
@@ -59,6 +61,8 @@ enum Task {
         #[command(flatten)]
         owner: Owner,
     },
+    /// Make what is served to arms for M997: keys, images, manifests
+    Release(Release),
     /// Tell how much flash and memory the firmware takes on each chip, and how much of that a bare
     /// program takes that joins WiFi and echoes TCP
     Size,
@@ -72,6 +76,44 @@ enum Task {
     Page,
     /// Run everything that must pass: format, lints, documentation, tests, emulator, images
     Test,
+}
+
+#[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+struct Release {
+    #[command(subcommand)]
+    command: Option<Signing>,
+    /// The board to build for; image, manifest and checksums are made for a web server
+    board: Option<Board>,
+    /// The key; the published development key where none is given
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// Where to put them
+    #[arg(long, value_name = "FOLDER", default_value = "release")]
+    to: PathBuf,
+}
+
+#[derive(Subcommand)]
+enum Signing {
+    /// Make a key of your own: FILE, which stays with you, and FILE.pub, which is built into the firmware
+    Keygen {
+        /// The file; never overwritten
+        file: PathBuf,
+    },
+    /// Sign an image, and print its manifest
+    Sign {
+        /// The image, as it goes into a firmware slot
+        image: PathBuf,
+        /// The board it is for
+        #[arg(long)]
+        board: Board,
+        /// Its version
+        #[arg(long)]
+        version: String,
+        /// The key; the published development key where none is given
+        #[arg(long, value_name = "FILE")]
+        key: Option<PathBuf>,
+    },
 }
 
 #[derive(clap::Args)]
@@ -122,6 +164,7 @@ fn perform(cli: Cli) -> Result<()> {
             println!("{}", image::image(board, &owner, setup)?.display());
             Ok(())
         }
+        Task::Release(what) => make_release(what, setup),
         Task::Size => table::sizes(setup),
         Task::Bench { csv } => {
             require(QEMU.0, QEMU.1, setup)?;
@@ -131,6 +174,43 @@ fn perform(cli: Cli) -> Result<()> {
         Task::Page => browser::test(setup),
         Task::Test => test::everything(setup),
     }
+}
+
+fn make_release(what: Release, setup: bool) -> Result<()> {
+    let key_of = |file: Option<PathBuf>| {
+        let file = file.unwrap_or_else(|| root().join(release::DEVELOPMENT_KEY));
+        release::read_key(&file)
+    };
+    match what.command {
+        Some(Signing::Keygen { file }) => {
+            let public = release::keygen(&file)?;
+            println!("keep {} to yourself; build with", file.display());
+            println!("QUILL_UPDATE_KEY={public}");
+        }
+        Some(Signing::Sign {
+            image,
+            board,
+            version,
+            key,
+        }) => {
+            let version = Version::parse(&version).context("a version is three numbers")?;
+            let text = release::manifest(board.name(), version, &image, &key_of(key)?)?;
+            print!("{text}");
+        }
+        None => {
+            let board = what.board.context("which board?")?;
+            let key = key_of(what.key)?;
+            release::ensure_built_in(&key, root())?;
+            let version = match std::env::var("QUILL_VERSION") {
+                Ok(version) => Version::parse(&version).context("QUILL_VERSION is no version")?,
+                Err(_) => Version::FIRMWARE,
+            };
+            let image = image::slot_image(board, setup)?;
+            let place = release::release(board.name(), version, &image, &key, &what.to)?;
+            println!("{}", place.display());
+        }
+    }
+    Ok(())
 }
 
 fn flash(board: Board, port: Option<&str>, owner: &Owner, setup: bool) -> Result<()> {

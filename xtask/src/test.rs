@@ -47,6 +47,7 @@ pub fn everything(setup: bool) -> Result<()> {
             .try_for_each(|board| board.lint(&["esp", "bare"], &[], setup))
     })?;
     step("emulator", || {
+        let newer = Board::Virt.build_version("9.0.0", setup)?;
         let firmware = Board::Virt.build(Board::Virt.binary(), &[], setup)?;
         run(cargo()
             .args([
@@ -57,10 +58,13 @@ pub fn everything(setup: bool) -> Result<()> {
                 "emulator",
                 "--test",
                 "emulator",
+                "--test",
+                "emulator_update",
                 "--",
                 "--test-threads=2",
             ])
-            .env("QUILL_VIRT_FIRMWARE", firmware))
+            .env("QUILL_VIRT_FIRMWARE", firmware)
+            .env("QUILL_VIRT_UPDATE", newer))
     })?;
     for board in Board::CHIPS {
         step(&format!("image for {}", board.name()), || {

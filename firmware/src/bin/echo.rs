@@ -11,10 +11,12 @@ use firmware::boards::virt::net::VirtNet;
 use firmware::boards::virt::world::{Lines, Recorder};
 use firmware::boards::virt::{self, executor};
 use firmware::services::line_us::ANYWHERE;
+use firmware::services::web;
+use protocol_core::machine::MAX_CLIENTS;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// As many as the firmware has: the stack looks through all of them at each packet.
-const CONNECTIONS: usize = 5;
+const CONNECTIONS: usize = (MAX_CLIENTS + 1) + (web::CONNECTIONS + 1);
 
 type Connections = Tcp<CONNECTIONS, 2048, 2048>;
 

@@ -10,26 +10,28 @@ use embassy_time::{Duration, Ticker};
 use firmware::board::Vitals;
 use firmware::boards::embassy_udp::Multicast;
 use firmware::boards::esp::data::BOARD;
-use firmware::boards::esp::flash::FlashPartition;
+use firmware::boards::esp::flash::{Chip, FlashPartition};
 use firmware::boards::esp::inputs::Inputs;
 use firmware::boards::esp::light::Light;
-use firmware::boards::esp::net::{Connections, Net, NetRunner, WebConnections};
+use firmware::boards::esp::net::{Connections, Net, NetRunner, UpdateConnection, WebConnections};
 use firmware::boards::esp::radio::EspRadio;
 use firmware::boards::esp::serial::{SerialRx, SerialTx};
 use firmware::boards::esp::servos::{FRAME, ServoPorts};
 use firmware::boards::esp::start::{self, Network, Parts};
 use firmware::boards::esp::system::Watchdog;
 use firmware::boards::esp::{Button, last_panic, pwm_timer, system};
+use firmware::boards::slots::PartitionedSlots;
 use firmware::services::House;
 use firmware::services::discovery::{self, Ports};
 use firmware::services::drawings::Album;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
-use firmware::services::{drawer, network, panel, web};
+use firmware::services::{drawer, network, panel, update, web};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 use protocol_core::panel::Lamp;
 use protocol_core::settings::Settings;
+use protocol_core::update::Standing;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// Bytes of a drawing that the machine holds: of what a chip has, this is what can be spared for good.
@@ -101,6 +103,12 @@ fn spawn(
         return Ok(());
     };
     let tcp = net.connections();
+    match parts.slots {
+        Some((slots, standing)) => {
+            spawner.spawn(updates(house, net.update_connection(), slots, standing)?);
+        }
+        None => defmt::error!("no two slots for firmware: there are no updates"),
+    }
     spawner.spawn(discovery(house, net.multicast())?);
     let web = net.web_connections();
     spawner.spawn(tell_address(house, net.stack())?);
@@ -133,6 +141,16 @@ async fn doorman(tcp: Connections) {
     if let Ok(acceptor) = tcp.bind(ANYWHERE).await {
         SERVER.turn_away(&acceptor).await;
     }
+}
+
+#[embassy_executor::task]
+async fn updates(
+    house: &'static House,
+    tcp: UpdateConnection,
+    slots: PartitionedSlots<Chip>,
+    standing: Standing,
+) {
+    update::run(house, tcp, slots, standing).await;
 }
 
 static WEB_SERVER: web::Server = web::Server::new();

@@ -2,20 +2,18 @@
 #![no_std]
 #![no_main]
 
-use core::ops::Range;
 use edge_nal::TcpBind;
-use embassy_embedded_hal::flash::partition::Partition;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_futures::select::{Either, select};
 use embassy_net::{Config, Runner, Stack, StackResources};
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embassy_sync::mutex::Mutex;
 use embassy_time::{Duration, Timer};
 use firmware::boards::embassy_tcp::{Buffers, Pool, Tcp};
 use firmware::boards::embassy_udp::Multicast;
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
+use firmware::boards::slots::PartitionedSlots;
 use firmware::boards::virt::flash::Flash;
 use firmware::boards::virt::net::VirtNet;
+use firmware::boards::virt::slots::{self, FlashPartition};
 use firmware::boards::virt::uart::{Receiver, Transmitter};
 use firmware::boards::virt::world::button::Button;
 use firmware::boards::virt::world::inputs::Inputs;
@@ -31,9 +29,10 @@ use firmware::services::drawings::Album;
 use firmware::services::line_us::{ANYWHERE, PORT, Server};
 use firmware::services::serial::{ReadError, serve};
 use firmware::services::storage::Memory;
-use firmware::services::{drawer, network, panel, web};
+use firmware::services::{drawer, network, panel, update, web};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS};
+use protocol_core::update::{Slot, Standing};
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// As on the desktop, so that pulses can be compared bit by bit.
@@ -43,14 +42,11 @@ const CONNECTIONS: usize = MAX_CLIENTS + 1;
 const BUFFER: usize = 2048;
 /// Connections of browsers, and one to turn another away.
 const WEB_CONNECTIONS: usize = web::CONNECTIONS + 1;
-/// Sockets: these, the DHCP client, and one more.
-const SOCKETS: usize = CONNECTIONS + WEB_CONNECTIONS + 3;
+/// Sockets: these, and one each for updates, the DHCP client, the DNS client and discovery.
+const SOCKETS: usize = CONNECTIONS + WEB_CONNECTIONS + 4;
 /// Bytes of a drawing that the machine holds.
 const DRAWING: usize = 64 * 1024;
 
-/// The disk, which settings and drawings share.
-type Disk = Mutex<NoopRawMutex, Flash>;
-type Part = Partition<'static, NoopRawMutex, Flash>;
 type SerialPort = (Receiver, Transmitter);
 type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
 type WebConnections = Tcp<WEB_CONNECTIONS, BUFFER, BUFFER>;
@@ -85,18 +81,22 @@ async fn boot(
     disk: Flash,
     port: SerialPort,
 ) {
-    static DISK: StaticCell<Disk> = StaticCell::new();
-    let disk = DISK.init(Mutex::new(disk));
-    let part = |range: Range<u32>| Partition::new(disk, range.start, range.end - range.start);
-    let memory = Memory::new(part(SETTINGS), 0..SETTINGS.end - SETTINGS.start);
-    let album = Album::new(part(DRAWINGS), 0..DRAWINGS.end - DRAWINGS.start);
+    let chip = slots::share(disk);
+    let (settings, drawings) = (
+        slots::partition(chip, SETTINGS),
+        slots::partition(chip, DRAWINGS),
+    );
+    let whole = |part: &FlashPartition| 0..part.size();
+    let (of_settings, of_drawings) = (whole(&settings), whole(&drawings));
+    let memory = Memory::new(settings, of_settings);
+    let album = Album::new(drawings, of_drawings);
     let (Some(memory), Some(album)) = (memory, album) else {
         log::error!("settings and drawings do not lie in whole pages");
         return;
     };
-    static MEMORY: StaticCell<Memory<Part>> = StaticCell::new();
+    static MEMORY: StaticCell<Memory<FlashPartition>> = StaticCell::new();
     let memory = MEMORY.init(memory);
-    static ALBUM: StaticCell<Album<Part>> = StaticCell::new();
+    static ALBUM: StaticCell<Album<FlashPartition>> = StaticCell::new();
     let album = ALBUM.init(album);
     // QEMU that takes no sleep (`-icount sleep=off`) now and then forgets a disk that answers while no
     // alarm is set: so there is one.
@@ -105,12 +105,19 @@ async fn boot(
             Timer::after_millis(1).await;
         }
     };
-    let load = async {
+    let read = async {
+        let mut choice = slots::choice(chip);
+        let running = update::choice(&mut choice).await;
+        let running = running.map_or(Slot::First, |choice| choice.slot());
+        let Some(standing) = update::at_start(&mut choice, running).await else {
+            log::info!("the new firmware did not confirm itself: back to the old one");
+            virt::power::exit(virt::power::RESTART_STATUS);
+        };
         album.open().await;
-        memory.load().await.0
+        (memory.load().await.0, running, standing)
     };
-    let settings = match select(load, alarm).await {
-        Either::First(settings) => settings,
+    let (settings, running, standing) = match select(read, alarm).await {
+        Either::First(read) => read,
         Either::Second(never) => never,
     };
     let identity = Identity {
@@ -123,9 +130,11 @@ async fn boot(
         identity,
         virt::VITALS,
     ));
+    let slots = slots::slots(chip, running);
+    let updates = (slots, standing);
     let started = serial(house, port).map(|task| spawner.spawn(task));
     if started
-        .and_then(|()| start(spawner, tick, house, (memory, album), card))
+        .and_then(|()| start(spawner, tick, house, (memory, album), card, updates))
         .is_err()
     {
         log::error!("a task does not fit");
@@ -136,8 +145,12 @@ fn start(
     spawner: Spawner,
     tick: embassy_executor::SendSpawner,
     house: &'static House,
-    (memory, album): (&'static mut Memory<Part>, &'static mut Album<Part>),
+    (memory, album): (
+        &'static mut Memory<FlashPartition>,
+        &'static mut Album<FlashPartition>,
+    ),
     card: VirtNet,
+    (slots, standing): (PartitionedSlots<Flash>, Standing),
 ) -> Result<(), SpawnError> {
     static RESOURCES: StaticCell<StackResources<SOCKETS>> = StaticCell::new();
     static BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; CONNECTIONS]> =
@@ -162,6 +175,11 @@ fn start(
         spawner.spawn(worker(tcp, client, house)?);
     }
     spawner.spawn(doorman(tcp)?);
+    static UPDATE_BUFFERS: ConstStaticCell<[Buffers<BUFFER, BUFFER>; 1]> =
+        ConstStaticCell::new([const { Buffers::new() }; _]);
+    static UPDATE_POOL: StaticCell<Pool<1, BUFFER, BUFFER>> = StaticCell::new();
+    let pool = UPDATE_POOL.init(Pool::new(UPDATE_BUFFERS.take()));
+    spawner.spawn(updates(house, Tcp::new(stack, pool), slots, standing)?);
     serve_browsers(spawner, house, stack)
 }
 
@@ -204,6 +222,16 @@ fn serve_browsers(
     }
 }
 
+#[embassy_executor::task]
+async fn updates(
+    house: &'static House,
+    tcp: Tcp<1, BUFFER, BUFFER>,
+    slots: PartitionedSlots<Flash>,
+    standing: Standing,
+) {
+    update::run(house, tcp, slots, standing).await;
+}
+
 static SERVER: Server = Server::new();
 
 #[embassy_executor::task(pool_size = MAX_CLIENTS)]
@@ -235,12 +263,12 @@ async fn serial(house: &'static House, port: SerialPort) {
 }
 
 #[embassy_executor::task]
-async fn storage(house: &'static House, memory: &'static mut Memory<Part>) {
+async fn storage(house: &'static House, memory: &'static mut Memory<FlashPartition>) {
     house.store.run(memory).await;
 }
 
 #[embassy_executor::task]
-async fn drawings(house: &'static House, album: &'static mut Album<Part>) {
+async fn drawings(house: &'static House, album: &'static mut Album<FlashPartition>) {
     house.drawings.run(album).await;
 }
 

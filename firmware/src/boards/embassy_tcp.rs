@@ -18,11 +18,12 @@ use core::{
     task::Poll,
 };
 
-use edge_nal::{Close, Readable, TcpBind, TcpShutdown, TcpSplit};
+use edge_nal::{AddrType, Close, Dns, Readable, TcpBind, TcpConnect, TcpShutdown, TcpSplit};
 use embassy_futures::yield_now;
 use embassy_net::{
     IpListenEndpoint, Stack,
-    tcp::{AcceptError, Error as NetError, TcpReader, TcpSocket, TcpWriter},
+    dns::DnsQueryType,
+    tcp::{AcceptError, ConnectError, Error as NetError, TcpReader, TcpSocket, TcpWriter},
 };
 use embassy_time::Duration;
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
@@ -90,6 +91,10 @@ pub enum Error {
     Connection(NetError),
     /// Could not listen.
     Accept(AcceptError),
+    /// Could not connect.
+    Connect(ConnectError),
+    /// The host's name is not known.
+    Name,
     /// All connections of the pool are in use.
     NoBuffers,
     /// Not an IPv4 address.
@@ -108,7 +113,7 @@ impl embedded_io_async::Error for Error {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::Connection(_) => ErrorKind::ConnectionReset,
-            Self::Accept(_) => ErrorKind::Other,
+            Self::Accept(_) | Self::Connect(_) | Self::Name => ErrorKind::Other,
             Self::NoBuffers => ErrorKind::OutOfMemory,
             Self::Address => ErrorKind::InvalidInput,
         }
@@ -152,6 +157,36 @@ impl<const N: usize, const RX: usize, const TX: usize> TcpBind for Tcp<N, RX, TX
                 port: local.port(),
             },
         })
+    }
+}
+
+impl<const N: usize, const RX: usize, const TX: usize> TcpConnect for Tcp<N, RX, TX> {
+    type Error = Error;
+    type Socket<'a> = Socket<N, RX, TX>;
+
+    async fn connect(&self, remote: SocketAddr) -> Result<Socket<N, RX, TX>, Error> {
+        let IpAddr::V4(address) = remote.ip() else {
+            return Err(Error::Address);
+        };
+        let mut socket = Socket::new(*self)?;
+        let connected = socket.inner.connect((address, remote.port())).await;
+        connected.map_err(Error::Connect)?;
+        Ok(socket)
+    }
+}
+
+impl<const N: usize, const RX: usize, const TX: usize> Dns for Tcp<N, RX, TX> {
+    type Error = Error;
+
+    async fn get_host_by_name(&self, host: &str, _: AddrType) -> Result<IpAddr, Error> {
+        let found = self.stack.dns_query(host, DnsQueryType::A).await;
+        let first = found.ok().and_then(|found| found.first().copied());
+        first.map(IpAddr::from).ok_or(Error::Name)
+    }
+
+    /// Nobody asks.
+    async fn get_host_by_address(&self, _: IpAddr, _: &mut [u8]) -> Result<usize, Error> {
+        Err(Error::Name)
     }
 }
 

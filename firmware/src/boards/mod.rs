@@ -10,6 +10,8 @@ pub mod embassy_udp;
 pub mod esp;
 #[cfg(any(feature = "desktop", feature = "virt"))]
 pub mod scripted_radio;
+#[cfg(feature = "slots")]
+pub mod slots;
 #[cfg(feature = "virt")]
 pub mod virt;
 
@@ -27,22 +29,30 @@ mod esp32s3;
 pub const SETTINGS: core::ops::Range<u32> = 0x29_0000..0x29_8000;
 /// Where the drawings are in it.
 pub const DRAWINGS: core::ops::Range<u32> = 0x29_8000..0x40_0000;
+/// Where it says which firmware starts.
+pub const BOOT_CHOICE: core::ops::Range<u32> = 0x9000..0xb000;
+/// The two slots for firmware.
+pub const SLOTS: [core::ops::Range<u32>; 2] = [0x1_0000..0x15_0000, 0x15_0000..0x29_0000];
 
 #[cfg(test)]
 mod tests {
     #[test]
-    fn settings_and_drawings_are_where_the_partition_table_says() {
+    fn everything_is_where_the_partition_table_says() {
         let table = include_str!("../../partitions.csv");
+        let [first, second] = super::SLOTS;
         for (name, range) in [
             ("settings,", super::SETTINGS),
             ("drawings,", super::DRAWINGS),
+            ("otadata,", super::BOOT_CHOICE),
+            ("ota_0,", first),
+            ("ota_1,", second),
         ] {
             let row = table.lines().find(|line| line.starts_with(name)).unwrap();
             let fields: Vec<&str> = row.split(',').map(str::trim).collect();
             let number =
                 |text: &str| u32::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
             let (start, size) = (number(fields[3]), number(fields[4]));
-            assert_eq!(range, start..start + size);
+            assert_eq!(range, start..start + size, "{name}");
         }
         // All of it is used.
         let pages = super::DRAWINGS.len() / 4096;

@@ -6,6 +6,7 @@
 use crate::board::{Frames, Servos};
 use core::array;
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -21,6 +22,7 @@ pub struct Arm {
     reports: [Signal<CriticalSectionRawMutex, Report>; MAX_ASKERS],
     /// Several services ask in the name of [`Client::HOUSE`], which has one errand at a time as well.
     house: Turns<CriticalSectionRawMutex, ()>,
+    ticks: AtomicU32,
     /// For the serial port's task alone.
     plan_changed: Signal<CriticalSectionRawMutex, ()>,
 }
@@ -32,6 +34,7 @@ impl Arm {
             machine: Mutex::new(RefCell::new(machine)),
             reports: array::from_fn(|_| Signal::new()),
             house: Turns::new(()),
+            ticks: AtomicU32::new(0),
             plan_changed: Signal::new(),
         }
     }
@@ -102,6 +105,11 @@ impl Arm {
         })
     }
 
+    /// Counts frames that had their set-point: what stands still is dead.
+    pub fn ticks(&self) -> u32 {
+        self.ticks.load(Ordering::Relaxed)
+    }
+
     /// Waits until the plan has room for a segment; a stop makes room.
     pub async fn room(&self) {
         self.until(|machine| machine.plan_room() > 0).await;
@@ -150,6 +158,9 @@ impl Arm {
             let began = Instant::now();
             let set_point = self.with(|machine| machine.tick(time));
             servos.write(time, &set_point);
+            // The tick alone counts, so load and store need not be one step.
+            self.ticks
+                .store(self.ticks().wrapping_add(1), Ordering::Relaxed);
             self.deliver();
             while let Some(event) = self.with(|machine| machine.next_event()) {
                 if event >= time + length {

@@ -13,6 +13,7 @@ pub mod panel;
 pub mod portal;
 pub mod serial;
 pub mod storage;
+pub mod update;
 pub mod web;
 
 use crate::board::Vitals;
@@ -36,6 +37,7 @@ use protocol_core::machine::{ArmData, Client, Machine};
 use protocol_core::motion::WAVE;
 use protocol_core::settings::{MachineName, Settings};
 use storage::{Store, StoreError};
+use update::Update;
 
 /// What the services of one arm share.
 pub struct House {
@@ -53,6 +55,8 @@ pub struct House {
     pub discovery: Discovery,
     /// Light and button.
     pub panel: Panel,
+    /// New firmware.
+    pub update: Update,
     /// The drawing that the machine draws by itself.
     pub job: Job,
     /// Line-us clients that are connected.
@@ -82,6 +86,7 @@ impl House {
             wifi: Wifi::new(),
             discovery: Discovery::new(),
             panel: Panel::new(),
+            update: Update::new(),
             job: Job::new(),
             clients: AtomicU8::new(0),
             address: Mutex::new(Cell::new(None)),

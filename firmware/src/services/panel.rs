@@ -62,7 +62,7 @@ impl Panel {
     }
 
     /// Shows something instead, until it is told `None`.
-    fn show_first(&self, first: Option<Lamp>) {
+    pub(super) fn show_first(&self, first: Option<Lamp>) {
         self.change(|shown| Shown { first, ..shown });
     }
 

@@ -195,7 +195,7 @@ fn a_refusal_names_the_letter_and_changes_nothing() {
         ("M588 Sx", "'x'"),
         ("M552 S5", "S must"),
         ("M291 Sx", "S"),
-        ("M997", "M997"),
+        ("M997 Sx", "S is"),
     ] {
         let reply = client.say(line);
         let reason = reply.strip_prefix("error INFO:\"").unwrap_or_else(|| {

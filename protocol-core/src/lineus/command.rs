@@ -11,6 +11,7 @@ use crate::motion::{
 };
 use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
 use crate::text::{Text, Words};
+use crate::update::{MAX_ADDRESS, ManifestAddress};
 use crate::wifi::{MAX_PASSWORD, MAX_SSID, Password, Ssid};
 
 /// A valid command, its numbers as written: not yet scaled, not yet limited.
@@ -84,6 +85,10 @@ pub enum Command {
     Forget(Ssid),
     /// `M588 S*`.
     ForgetAll,
+    /// M997.
+    Update,
+    /// `M997 S`: where to ask from now on; with an empty text, nowhere.
+    SetUpdateAddress(Option<ManifestAddress>),
     /// M20.
     Drawings,
     /// M39.
@@ -194,7 +199,7 @@ fn other_than_a_move<'a>(
         (b'M', 587) => network(&mut words),
         (b'M', 588) => forget(&mut words),
         (b'M', 589) => own_network(&mut words),
-        (b'M', 997) => Err(Refusal::NotYet),
+        (b'M', 997) => update(&mut words),
         _ => Err(Words::new(line).unknown().into()),
     }
 }
@@ -381,6 +386,26 @@ fn forget<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     }
 }
 
+fn update<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+    match words.letter()? {
+        None => Ok(Command::Update),
+        Some('S') => {
+            let text = words.text('S')?;
+            let address = match text.unescape::<MAX_ADDRESS>() {
+                Some(bytes) if bytes.is_empty() => None,
+                bytes => {
+                    let address = bytes
+                        .as_deref()
+                        .and_then(|bytes| ManifestAddress::new(str::from_utf8(bytes).ok()?));
+                    Some(address.ok_or(Refusal::BadAddress(text.raw()))?)
+                }
+            };
+            without_parameters(words, Command::SetUpdateAddress(address))
+        }
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
 /// M589 is where RepRap firmware has the password of a machine's own network.
 fn own_network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     match words.letter()? {
@@ -533,6 +558,7 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
                     | Command::SetWaves(_)
                     | Command::Forget(_)
                     | Command::ForgetAll
+                    | Command::SetUpdateAddress(_)
                     | Command::FactoryReset
             ) =>
         {

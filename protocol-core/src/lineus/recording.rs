@@ -19,7 +19,8 @@ enum Fate {
     Answered,
     /// It ends the recording.
     End,
-    /// It has no place in a drawing: another recording, what is remembered, what is drawn from memory.
+    /// It has no place in a drawing: another recording, what is remembered, what is drawn from memory, new
+    /// firmware.
     Refused,
 }
 
@@ -65,6 +66,8 @@ const fn fate(command: &Command) -> Fate {
         | Command::SetDirections(_)
         | Command::FactoryReset
         | Command::ProtectOwnNetwork(_)
+        | Command::Update
+        | Command::SetUpdateAddress(_)
         | Command::SetReplay(_) => Fate::Refused,
     }
 }
@@ -203,14 +206,12 @@ mod tests {
             ("M23 K2", "M23"),
             ("M23 S1", "M23"),
             ("M85 S5", "M85"),
+            ("M997", "M997"),
+            ("M997 S\"http://a/b\"", "M997"),
         ] {
             let refused = std::format!("error INFO:\"{code} cannot be part of a drawing\"");
             assert_eq!(recorded(&[line]), [(Request::Answered, refused)], "{line}");
         }
-        // It names itself.
-        let (request, answer) = recorded(&["M997"]).remove(0);
-        assert_eq!(request, Request::Answered);
-        assert!(answer.starts_with("error INFO:\"M997 "), "{answer}");
     }
 
     #[test]

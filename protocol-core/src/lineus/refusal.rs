@@ -4,6 +4,7 @@ use crate::arm::MAX_HEIGHT;
 use crate::drawings::Slot;
 use crate::settings::MAX_NAME;
 use crate::text::{MAX_EXCERPT, MAX_LINE, TooLong, WordError, excerpt, excerpt_of_bytes};
+use crate::update::MAX_ADDRESS;
 use crate::wifi::{MAX_NETWORKS, MAX_PASSWORD, MIN_PASSWORD};
 use core::fmt;
 
@@ -14,8 +15,6 @@ pub enum Refusal<'a> {
     TooLong,
     /// The line is no words.
     Words(WordError<'a>),
-    /// M997, which this firmware will know, but does not yet.
-    NotYet,
     /// An M code of the original's that no document tells the meaning of.
     Reserved(u32),
     /// A code that is for other connections than WebSockets.
@@ -62,6 +61,8 @@ pub enum Refusal<'a> {
     BadPassword,
     /// No machine name.
     BadName(&'a [u8]),
+    /// No address of a manifest.
+    BadAddress(&'a [u8]),
     /// More networks than can be remembered.
     TooManyNetworks,
     /// No network of this name is remembered.
@@ -85,9 +86,6 @@ impl fmt::Display for Refusal<'_> {
         match *self {
             Self::TooLong => write!(out, "line longer than {MAX_LINE} bytes"),
             Self::Words(error) => words(error, out),
-            Self::NotYet => {
-                out.write_str("M997 is missing: this firmware cannot update itself yet")
-            }
             Self::Reserved(number) => write!(out, "M{number} is reserved and does nothing here"),
             Self::NotHere(code) => write!(out, "M{code} is refused over the WebSocket"),
             Self::Missing(letter) => write!(out, "parameter {letter} is missing"),
@@ -130,6 +128,11 @@ impl fmt::Display for Refusal<'_> {
             Self::BadName(text) => write!(
                 out,
                 "P is '{}', a name is 1 to {MAX_NAME} letters, digits and inner hyphens",
+                excerpt_of_bytes(text, MAX_EXCERPT)
+            ),
+            Self::BadAddress(text) => write!(
+                out,
+                "S is '{}', an address is http://HOST[:PORT]/PATH, no more than {MAX_ADDRESS} bytes",
                 excerpt_of_bytes(text, MAX_EXCERPT)
             ),
             Self::TooManyNetworks => write!(

@@ -7,6 +7,7 @@ use crate::machine::{Limited, Report};
 use crate::motion::{Microdegrees, Micros, Position};
 use crate::settings::{MachineName, Settings};
 use crate::text::{MAX_EXCERPT, excerpt, excerpt_of_bytes};
+use crate::update::{self, KeyName, Version};
 use crate::wifi::{Heard, Joined, MAX_NETWORKS, MAX_SSID, Networks, Phase, Ssid, Status};
 use core::fmt::{self, Write};
 use heapless::Vec;
@@ -16,7 +17,7 @@ pub const TERMINATOR: &str = "\r\n\0";
 /// Longest message, terminator included. Everyday replies stay below 256 bytes, because some clients
 /// read one packet for each reply into a buffer of that size; diagnostics, lists of networks and lists
 /// of drawings may be longer. Every network that is remembered fits into such a list, whatever its name.
-pub const MAX_REPLY: usize = 768;
+pub const MAX_REPLY: usize = 896;
 const _: () = assert!(
     "ok ".len() + MAX_NETWORKS * (" \"\":1".len() + 2 * MAX_SSID) + TERMINATOR.len() <= MAX_REPLY
 );
@@ -26,7 +27,7 @@ const _: () = assert!(
         <= MAX_REPLY
 );
 /// Version in the greeting: the level of the original's protocol that is complete, then our own.
-pub const VERSION: &str = concat!("1.0.4 Quill ", env!("CARGO_PKG_VERSION"));
+pub const VERSION: &str = concat!("1.0.4 Quill ", env!("QUILL_VERSION"));
 
 /// Longest piece of a panic's text that diagnostics tell, in characters.
 const MAX_PANIC: usize = 120;
@@ -75,6 +76,10 @@ pub struct Diagnostics<'a> {
     pub reset_reason: &'a str,
     /// How the memory for the settings is.
     pub memory: &'a str,
+    /// How updates stand.
+    pub update: &'a update::Status,
+    /// Whose signature is believed.
+    pub update_key: KeyName,
     /// Room for drawings.
     pub space: Space,
     /// The last words of a firmware that panicked before, if there are any.
@@ -319,7 +324,7 @@ impl Reply {
             "ok name:{}{} mac:{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X} Serial:{} \
              Version:\"{VERSION}\" Uptime:{} Position:{},{},{} Cal:{shoulder},{elbow},{pen} \
              ZMap:{map} NibShift:{shift} Servos:{turn_s},{turn_e},{turn_p} WifiMode:{} WifisConfigured:{} Wifi:\"{}\" FreeHeap:{} ResetReason:\"{}\" \
-             FSUsed:{} FSTotal:{} FSFree:{} Memory:\"{}\"{}",
+             FSUsed:{} FSTotal:{} FSFree:{} Memory:\"{}\" UpdateKey:{} Update:\"{}\"{}",
             state.name.as_str(),
             Host(state.host),
             state.identity.serial(),
@@ -336,7 +341,16 @@ impl Reply {
             state.space.total,
             state.space.free(),
             state.memory,
+            state.update_key,
+            state.update,
             LastPanic(state.last_panic),
+        ));
+    }
+
+    /// A new firmware is in place.
+    pub fn updated(&mut self, version: Version) {
+        self.compose(format_args!(
+            "ok INFO:\"{version} is in place and starts now\""
         ));
     }
 
@@ -750,6 +764,15 @@ mod tests {
                 free_memory: u32::MAX,
                 reset_reason: "the watchdog bit after a long silence",
                 memory: "worn out, and what is worse, it does not take what is stored",
+                update: &update::Status {
+                    progress: update::Progress::Idle,
+                    standing: update::Standing::Settled,
+                    refused: Some(update::Rejection::WrongLength {
+                        served: u32::MAX,
+                        expected: u32::MAX,
+                    }),
+                },
+                update_key: KeyName::Own([0xff; 4]),
                 space: Space {
                     total: u32::MAX,
                     used: 1_234_567_890,
@@ -759,7 +782,8 @@ mod tests {
         });
         assert!(
             text.contains(" FSTotal:4294967295 FSFree:3060399405 Memory:\"worn out,")
-                && text.contains("stored\" LastPanic:\"panicked at 'somewhere'?")
+                && text.contains("stored\" UpdateKey:ffffffff Update:\"refused: ")
+                && text.contains("one 4294967295\" LastPanic:\"panicked at 'somewhere'?")
                 && text.ends_with("...\""),
             "{text}"
         );

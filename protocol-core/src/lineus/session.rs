@@ -10,6 +10,7 @@ use crate::machine::{Errand, Manner, Target};
 use crate::motion::{StepSize, Transform, WideCoordinate};
 use crate::settings::{AccessPointName, MachineName, StartMode};
 use crate::text::{LineBuffer, MAX_LINE, Words};
+use crate::update::ManifestAddress;
 use crate::wifi::{Password, Ssid};
 use heapless::Vec;
 
@@ -75,6 +76,11 @@ pub enum Request {
     Forget(Ssid),
     /// Every network is to be forgotten; answered by [`Reply::ok`].
     ForgetAll,
+    /// To be answered by [`Reply::updated`] when the new firmware is about to start, or by
+    /// [`Reply::error`].
+    Update,
+    /// To be remembered, and answered by [`Reply::ok`].
+    SetUpdateAddress(Option<ManifestAddress>),
     /// To be answered by [`Reply::drawings`].
     Drawings,
     /// To be answered by [`Reply::space`].
@@ -273,6 +279,8 @@ pub(super) fn request(
         },
         Command::Forget(ssid) => Request::Forget(ssid.clone()),
         Command::ForgetAll => Request::ForgetAll,
+        Command::Update => Request::Update,
+        Command::SetUpdateAddress(address) => Request::SetUpdateAddress(address.clone()),
         Command::Drawings => Request::Drawings,
         Command::Space => Request::Space,
         Command::Button => Request::Button,
@@ -500,9 +508,12 @@ mod tests {
             ("M280 S1 S2", "parameter S is repeated"),
             ("M280 Z1", "unknown parameter Z"),
             (
-                "M997",
-                "M997 is missing: this firmware cannot update itself yet",
+                "M997 S\"https://a/b\"",
+                "S is 'https://a/b', an address is http://HOST[:PORT]/PATH, no more than 96 bytes",
             ),
+            ("M997 S", "S has no value"),
+            ("M997 S\"\" S\"\"", "parameter S is repeated"),
+            ("M997 P1", "unknown parameter P"),
         ] {
             assert_eq!(
                 only(line),
@@ -522,6 +533,14 @@ mod tests {
             (
                 "G28 ",
                 Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
+            ),
+            ("M997", Request::Update),
+            ("M997 S\"\"", Request::SetUpdateAddress(None)),
+            (
+                "M997 S\"http://192.168.1.7:8000/quill.txt\"",
+                Request::SetUpdateAddress(ManifestAddress::new(
+                    "http://192.168.1.7:8000/quill.txt",
+                )),
             ),
             ("M114", Request::Position),
             ("m114 s", Request::Angles),

@@ -16,6 +16,7 @@
 //! | 25 | how far the nib moves as it comes down: little-endian hundredths of a millimetre |
 //! | 26 | servos that turn the other way: a bit for shoulder, elbow and pen |
 //! | 8 | whose pages may drive the arm: empty, `*`, or an origin |
+//! | 32 | where updates are asked for; no field, nowhere |
 //!
 //! How it may change: a new setting gets a new tag. Firmware that does not know the tag skips it, and
 //! where a field is missing, because the record is older than the setting, the setting has its default.
@@ -28,6 +29,7 @@ use super::{
 };
 use crate::arm::{Calibration, Directions, NibShift, ZMap};
 use crate::drawings::ButtonDraws;
+use crate::update::{MAX_ADDRESS, ManifestAddress};
 use crate::wifi::{MAX_NETWORK, MAX_NETWORKS, MAX_PASSWORD, Network, Password};
 use heapless::Vec;
 
@@ -46,6 +48,7 @@ const MAP: u8 = 24;
 const SHIFT: u8 = 25;
 const DIRECTIONS: u8 = 26;
 const ALLOWED_ORIGIN: u8 = 8;
+const UPDATE_ADDRESS: u8 = 32;
 
 /// Tag and length.
 const HEAD: usize = 2;
@@ -60,10 +63,12 @@ pub const MAX_RECORD: usize = 1
     + (HEAD + ZMap::BYTES)
     + (HEAD + 2)
     + (HEAD + 1)
-    + (HEAD + MAX_ORIGIN);
+    + (HEAD + MAX_ORIGIN)
+    + (HEAD + MAX_ADDRESS);
 
 // Lengths are one byte.
-const _: () = assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255 && MAX_ORIGIN <= 255);
+const _: () =
+    assert!(MAX_NAME <= 255 && MAX_NETWORK <= 255 && MAX_ORIGIN <= 255 && MAX_ADDRESS <= 255);
 
 impl Settings {
     /// The record of all settings.
@@ -90,6 +95,9 @@ impl Settings {
         if self.allowed_origin != AllowedOrigin::None {
             let origin = self.allowed_origin.as_str();
             put(&mut record, ALLOWED_ORIGIN, origin.as_bytes());
+        }
+        if let Some(address) = &self.update_address {
+            put(&mut record, UPDATE_ADDRESS, address.as_str().as_bytes());
         }
         record
     }
@@ -133,6 +141,10 @@ impl Settings {
             (DIRECTIONS, &[bits]) => self.directions = Directions::from_byte(bits)?,
             (ALLOWED_ORIGIN, text) => {
                 self.allowed_origin = AllowedOrigin::new(core::str::from_utf8(text).ok()?)?;
+            }
+            (UPDATE_ADDRESS, text) => {
+                let address = ManifestAddress::new(core::str::from_utf8(text).ok()?)?;
+                self.update_address = Some(address);
             }
             _ => return None,
         }

@@ -15,22 +15,25 @@ use esp_hal::peripherals::FLASH;
 use esp_storage::FlashStorage;
 use static_cell::StaticCell;
 
-type Chip = YieldingAsync<BlockingAsync<FlashStorage<'static>>>;
+/// The flash chip.
+pub type Chip = YieldingAsync<BlockingAsync<FlashStorage<'static>>>;
 
 /// A partition. Addresses count from its beginning; clones share the chip.
 pub type FlashPartition = Partition<'static, NoopRawMutex, Chip>;
 
-/// Opens the flash and finds partitions by their names; `None` where the table has no such one.
+/// Opens the flash and finds partitions by their names; `None` where the table has no such one. Beside
+/// them, the address of the firmware that runs, if it is known.
 pub(super) fn open<const N: usize>(
     flash: FLASH<'static>,
     names: [&str; N],
-) -> [Option<FlashPartition>; N] {
+) -> ([Option<FlashPartition>; N], Option<u32>) {
     static CHIP: StaticCell<Mutex<NoopRawMutex, Chip>> = StaticCell::new();
 
     let mut flash = FlashStorage::new(flash);
-    let places = find(&mut flash, names);
+    let (places, running) = find(&mut flash, names);
     let chip = CHIP.init(Mutex::new(YieldingAsync::new(BlockingAsync::new(flash))));
-    places.map(|place| place.map(|at| Partition::new(chip, at.offset, at.size)))
+    let partition = |at: Place| Partition::new(chip, at.offset, at.size);
+    (places.map(|place| place.map(partition)), running)
 }
 
 #[derive(Clone, Copy)]
@@ -39,21 +42,28 @@ struct Place {
     size: u32,
 }
 
-fn find<const N: usize>(flash: &mut FlashStorage<'static>, names: [&str; N]) -> [Option<Place>; N] {
+fn find<const N: usize>(
+    flash: &mut FlashStorage<'static>,
+    names: [&str; N],
+) -> ([Option<Place>; N], Option<u32>) {
     let mut buffer = [0; PARTITION_TABLE_MAX_LEN];
     match read_partition_table(flash, &mut buffer) {
-        Ok(table) => names.map(|name| {
-            table
-                .iter()
-                .find(|entry| entry.label_as_str() == name)
-                .map(|entry| Place {
-                    offset: entry.offset(),
-                    size: entry.len(),
-                })
-        }),
+        Ok(table) => {
+            let places = names.map(|name| {
+                table
+                    .iter()
+                    .find(|entry| entry.label_as_str() == name)
+                    .map(|entry| Place {
+                        offset: entry.offset(),
+                        size: entry.len(),
+                    })
+            });
+            let running = table.booted_partition().ok().flatten();
+            (places, running.map(|entry| entry.offset()))
+        }
         Err(error) => {
             defmt::error!("partition table: {}", error);
-            [None; N]
+            ([None; N], None)
         }
     }
 }

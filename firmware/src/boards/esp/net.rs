@@ -20,12 +20,15 @@ pub const CONNECTIONS: usize = MAX_CLIENTS + 1;
 pub const WEB_CONNECTIONS: usize = web::CONNECTIONS + 1;
 /// Services for guests, each with a socket: addresses and names.
 const FOR_GUESTS: usize = 2;
-/// Sockets: the connections, the services for guests, the DHCP client, discovery.
-const SOCKETS: usize = CONNECTIONS + WEB_CONNECTIONS + FOR_GUESTS + 2;
+/// Sockets: the connections, the services for guests, and one each for updates, the DHCP client, the DNS
+/// client and discovery.
+const SOCKETS: usize = CONNECTIONS + WEB_CONNECTIONS + FOR_GUESTS + 4;
 /// Buffer of a connection in bytes, in each direction: a segment of Ethernet.
 const BUFFER: usize = 1536;
 /// The connections.
 pub type Connections = Tcp<CONNECTIONS, BUFFER, BUFFER>;
+/// The connection for updates.
+pub type UpdateConnection = Tcp<1, BUFFER, BUFFER>;
 /// Buffer of a browser's connection in bytes, in each direction. Requests are short, and the page goes out
 /// in pieces of this size.
 const WEB_BUFFER: usize = 1024;
@@ -74,6 +77,18 @@ impl Net {
         static POOL: StaticCell<Pool<CONNECTIONS, BUFFER, BUFFER>> = StaticCell::new();
 
         let buffers = BUFFERS.init_with(|| [const { Buffers::new() }; CONNECTIONS]);
+        Tcp::new(self.stack, POOL.init(Pool::new(buffers)))
+    }
+
+    /// The connection for updates.
+    ///
+    /// # Panics
+    /// When it is called twice.
+    pub fn update_connection(&self) -> UpdateConnection {
+        static BUFFERS: StaticCell<[Buffers<BUFFER, BUFFER>; 1]> = StaticCell::new();
+        static POOL: StaticCell<Pool<1, BUFFER, BUFFER>> = StaticCell::new();
+
+        let buffers = BUFFERS.init_with(|| [const { Buffers::new() }]);
         Tcp::new(self.stack, POOL.init(Pool::new(buffers)))
     }
 

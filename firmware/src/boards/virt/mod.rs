@@ -16,6 +16,7 @@ mod mmio;
 pub mod net;
 mod plic;
 pub mod power;
+pub mod slots;
 mod time;
 pub mod uart;
 pub mod virtio;

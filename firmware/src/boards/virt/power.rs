@@ -9,6 +9,9 @@ const POWER: Register = unsafe { Register::at(map::POWER) };
 /// Exit status after a panic or a processor exception.
 pub const PANIC_STATUS: u16 = 101;
 
+/// Exit status of a firmware that wants to be started again: whoever drives the emulator does it.
+pub const RESTART_STATUS: u16 = 102;
+
 /// Ends QEMU with `status`.
 pub fn exit(status: u16) -> ! {
     POWER.write(if status == 0 {

@@ -2,6 +2,7 @@
 
 use super::drawings;
 use crate::services::House;
+use crate::services::update::KEY_NAME;
 use core::fmt::Display;
 use protocol_core::lineus::{Diagnostics, Refusal, Reply, Request};
 use protocol_core::machine::Client;
@@ -70,6 +71,17 @@ pub async fn perform(request: &Request, reply: &mut Reply, client: Client, house
             };
             change("networks", forget, reply, client, house).await;
             house.wifi.changed();
+        }
+        Request::Update => match house.update.ask().await {
+            Ok(version) => reply.updated(version),
+            Err(rejection) => reply.error(format_args!("{rejection}")),
+        },
+        Request::SetUpdateAddress(address) => {
+            let set = |settings: &mut Settings| {
+                settings.update_address = address.clone();
+                Ok(())
+            };
+            change("address", set, reply, client, house).await;
         }
         Request::Drawings
         | Request::Space
@@ -144,6 +156,8 @@ fn diagnose(reply: &mut Reply, house: &House) {
         free_memory: (house.vitals.free_memory)(),
         reset_reason: house.vitals.reset_reason,
         memory: house.store.health().text(),
+        update: &house.update.status(),
+        update_key: KEY_NAME,
         space: house.drawings.space(),
         last_panic: house.vitals.last_panic,
     });

@@ -37,12 +37,18 @@ fn settings() -> impl Strategy<Value = Settings> {
     let numbers = (1..=4u8, 1..=2u8, any::<bool>(), button);
     let fitting = (uniform4(-500..=500i16), -200..=200i16, 0..8u8);
     let origin = prop_oneof!["", "\\*", "https?://[a-z0-9.-]{1,40}(:[0-9]{1,5})?"];
+    let address = option::of("http://[a-z0-9]{1,20}(:[1-9][0-9]{0,3})?/[a-z0-9._/-]{0,60}");
     (
         "[A-Za-z0-9]([A-Za-z0-9-]{0,30}[A-Za-z0-9])?",
         uniform3(any::<i32>()),
         networks(),
         numbers,
-        (option::of(vec(any::<u8>(), 8..=63)), fitting, origin),
+        (
+            option::of(vec(any::<u8>(), 8..=63)),
+            fitting,
+            origin,
+            address,
+        ),
     )
         .prop_map(
             |(
@@ -50,7 +56,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 offsets,
                 networks,
                 (start, access_point, waves, button),
-                (own, (map, shift, servos), origin),
+                (own, (map, shift, servos), origin, address),
             )| {
                 Settings {
                     name: MachineName::new(&name).unwrap(),
@@ -67,6 +73,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                     shift: NibShift::from_hundredths(shift).unwrap(),
                     directions: Directions::from_byte(servos).unwrap(),
                     allowed_origin: AllowedOrigin::new(&origin).unwrap(),
+                    update_address: address.map(|text| ManifestAddress::new(&text).unwrap()),
                 }
             },
         )
@@ -163,7 +170,8 @@ fn the_bytes_of_a_record() {
         \x18\x08\0\0\x64\0\x2c\x01\x38\xff\
         \x19\x02\xab\xff\
         \x1a\x01\x02\
-        \x08\x13https://example.org";
+        \x08\x13https://example.org\
+        \x20\x0ahttp://a/b";
     let settings = Settings::from_bytes(record).unwrap();
     assert_eq!(settings.to_bytes(), record);
     assert_eq!(settings.name.as_str(), "robs-lineus");
@@ -178,6 +186,8 @@ fn the_bytes_of_a_record() {
     assert_eq!(settings.start, StartMode::StationLongPress);
     assert_eq!(settings.access_point, AccessPointName::Machine);
     assert!(!settings.waves);
+    let address = settings.update_address.as_ref().unwrap();
+    assert_eq!(address.as_str(), "http://a/b");
     assert_eq!(settings.button, ButtonDraws::Always(Slot::new(7).unwrap()));
     let password = settings.own_password.as_ref().unwrap();
     assert_eq!(password.as_bytes(), b"\x00\xffsecret");
@@ -191,6 +201,7 @@ fn the_bytes_of_a_record() {
 fn the_longest_record_fits_exactly() {
     let mut settings = Settings {
         name: MachineName::new("abcdefghijklmnopqrstuvwxyz012345").unwrap(),
+        update_address: ManifestAddress::new(&std::format!("http://a/{:x<87}", "")),
         own_password: Password::new(&[0xff; MAX_PASSWORD]),
         allowed_origin: AllowedOrigin::new(&std::format!("http://{}", "x".repeat(MAX_ORIGIN - 7)))
             .unwrap(),
@@ -247,6 +258,8 @@ fn a_value_that_cannot_be_leaves_the_others() {
         b"\x1a\x01\x08",
         b"\x08\x04null",
         b"\x08\x01\xff",
+        b"\x20\x00",
+        b"\x20\x03ftp",
     ] {
         let record = [&[VERSION], field, b"\x06\x01\x00"].concat();
         assert_eq!(

@@ -2,7 +2,7 @@
 //!
 //! Into the one with the lower slot go records ([`record`]): each servo frame and each change of the light, into a file that
 //! keeps them whether or not somebody reads. Out of the other come lines of text, `button down` and `button up`,
-//! `door open` and its like ([`inputs`]), `instructions` and `panic`; the log goes
+//! `door open` and its like ([`inputs`]), `instructions`, `panic` and `hang`; the log goes
 //! into it, so that a person at a terminal sees the one and types the other.
 
 pub mod button;
@@ -29,6 +29,14 @@ fn on_line(line: &[u8]) {
         b"power off" => inputs::change(|sensors| sensors.power_off = true),
         b"power on" => inputs::change(|sensors| sensors.power_off = false),
         b"instructions" => log::info!("instructions {}", executor::instructions()),
+        b"hang" => {
+            log::info!("the host asked for a hang");
+            // The servo tick as well: what a watchdog is for.
+            riscv::interrupt::disable();
+            loop {
+                core::hint::spin_loop();
+            }
+        }
         b"panic" => panic!("the host asked for a panic"),
         _ => log::warn!("unknown line {}", line.escape_ascii()),
     }

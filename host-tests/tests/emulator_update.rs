@@ -1,0 +1,183 @@
+//! The emulated machine updates itself over its network from one build to another, stays there if that works,
+//! and is back if it does not. The emulator's driver is bootloader and watchdog.
+
+use host_tests::desktop::Client;
+use protocol_core::update::Version;
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::thread;
+use std::time::Duration;
+use tempfile::TempDir;
+use xtask::board::root;
+use xtask::emulator::{Emulator, Options, RESTART, Time, free_address};
+use xtask::{release, slots};
+
+const PATIENCE: Duration = Duration::from_secs(120);
+/// The version that `cargo xtask test` builds the other firmware as.
+const NEW: &str = "9.0.0";
+
+fn firmware(variable: &str) -> PathBuf {
+    let file = std::env::var_os(variable);
+    PathBuf::from(file.unwrap_or_else(|| {
+        panic!("{variable} names a firmware: run these tests with `cargo xtask test`")
+    }))
+}
+
+/// Serves the files of a folder, as any web server does; gives its port.
+fn serve(folder: PathBuf) -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    thread::spawn(move || {
+        for stream in listener.incoming() {
+            let mut stream = stream.unwrap();
+            let mut lines = BufReader::new(stream.try_clone().unwrap()).lines();
+            let request = lines.next().unwrap().unwrap();
+            while lines
+                .next()
+                .is_some_and(|line| line.is_ok_and(|line| !line.is_empty()))
+            {}
+            let name = request.split(' ').nth(1).unwrap().trim_start_matches('/');
+            let head = |status: &str, length: usize| {
+                format!("HTTP/1.0 {status}\r\nServer: test\r\nContent-Length: {length}\r\n\r\n")
+            };
+            // The machine may have heard enough.
+            let _ = match fs::read(folder.join(name)) {
+                Ok(content) => stream
+                    .write_all(head("200 OK", content.len()).as_bytes())
+                    .and_then(|()| stream.write_all(&content)),
+                Err(_) => stream.write_all(head("404 Not Found", 0).as_bytes()),
+            };
+        }
+    });
+    port
+}
+
+/// A machine with its disk, and a server with a newer firmware.
+struct Bench {
+    folder: TempDir,
+    address: SocketAddr,
+    port: u16,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let served = folder.path().join("served");
+        let image = slots::flatten(&firmware("QUILL_VIRT_UPDATE")).unwrap();
+        let key = release::read_key(&root().join(release::DEVELOPMENT_KEY)).unwrap();
+        let version = Version::parse(NEW).unwrap();
+        release::release("virt", version, &image, &key, &served).unwrap();
+        Self {
+            address: free_address().unwrap(),
+            port: serve(served),
+            folder,
+        }
+    }
+
+    /// Switches the machine on.
+    fn boot(&self) -> Emulator {
+        let options = Options {
+            line_us: self.address,
+            flash: self.folder.path().join("flash"),
+            time: Time::Wall,
+        };
+        Emulator::boot(&firmware("QUILL_VIRT_FIRMWARE"), &options).unwrap()
+    }
+
+    /// Switches the machine on, and waits until it can be used.
+    fn start(&self) -> (Emulator, Client) {
+        let mut emulator = self.boot();
+        emulator.wait_for_line("Line-us clients", PATIENCE).unwrap();
+        let mut client = Client::connect(self.address);
+        let greeting = client.reply();
+        assert!(greeting.starts_with("hello VERSION:"), "{greeting:?}");
+        (emulator, client)
+    }
+
+    /// Updates the machine, and waits until it has switched itself off.
+    fn update(&self) {
+        let (mut emulator, mut client) = self.start();
+        assert!(!is_new(&mut client));
+        let address = format!("http://10.0.2.2:{}/virt.txt", self.port);
+        assert_eq!(client.say(&format!("M997 S\"{address}\"")), "ok ");
+        assert_eq!(
+            client.say("M997"),
+            format!("ok INFO:\"{NEW} is in place and starts now\"")
+        );
+        let status = emulator.wait_off(PATIENCE).unwrap();
+        assert_eq!(status.code(), Some(RESTART));
+    }
+}
+
+fn is_new(client: &mut Client) -> bool {
+    let reply = client.say("M122");
+    assert!(reply.contains(" UpdateKey:development"), "{reply}");
+    reply.contains(&format!("Quill {NEW}\""))
+}
+
+/// What M122 says of updates.
+fn told(client: &mut Client) -> String {
+    let reply = client.say("M122");
+    let (_, told) = reply.split_once("Update:\"").unwrap();
+    told.split('"').next().unwrap().to_owned()
+}
+
+#[test]
+fn a_new_firmware_that_hangs_three_times_is_gone() {
+    let bench = Bench::new();
+    bench.update();
+    for _ in 0..3 {
+        let mut emulator = bench.boot();
+        emulator.wait_for_line("Line-us clients", PATIENCE).unwrap();
+        emulator.say("hang").unwrap();
+        emulator
+            .wait_for_line("asked for a hang", PATIENCE)
+            .unwrap();
+        // Here the watchdog bites.
+    }
+    let mut emulator = bench.boot();
+    emulator
+        .wait_for_line("back to the old one", PATIENCE)
+        .unwrap();
+    let status = emulator.wait_off(PATIENCE).unwrap();
+    assert_eq!(status.code(), Some(RESTART));
+    let (_emulator, mut client) = bench.start();
+    assert!(!is_new(&mut client));
+    assert_eq!(
+        told(&mut client),
+        format!("{NEW} did not confirm itself, back to this one")
+    );
+}
+
+#[test]
+fn a_new_firmware_that_works_stays() {
+    let bench = Bench::new();
+    bench.update();
+    let (emulator, mut client) = bench.start();
+    assert!(is_new(&mut client));
+    // Ten good seconds, and some for a busy computer.
+    let mut trial = told(&mut client);
+    for _ in 0..600 {
+        if trial == "none" {
+            break;
+        }
+        assert_eq!(trial, "on trial, start 1 of 3");
+        thread::sleep(Duration::from_millis(100));
+        trial = told(&mut client);
+    }
+    assert_eq!(trial, "none");
+    drop(emulator);
+    for _ in 0..4 {
+        let (_emulator, mut client) = bench.start();
+        assert!(is_new(&mut client));
+        assert_eq!(told(&mut client), "none");
+    }
+    // What runs already is not loaded again.
+    let (_emulator, mut client) = bench.start();
+    assert_eq!(
+        client.say("M997"),
+        format!("error INFO:\"{NEW} is what runs already\"")
+    );
+}
