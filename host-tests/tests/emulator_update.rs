@@ -82,6 +82,8 @@ impl Bench {
             line_us: self.address,
             flash: self.folder.path().join("flash"),
             time: Time::Wall,
+            serial: None,
+            web: None,
         };
         Emulator::boot(&firmware("QUILL_VIRT_FIRMWARE"), &options).unwrap()
     }
