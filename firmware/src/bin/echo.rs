@@ -15,8 +15,9 @@ use firmware::services::web;
 use protocol_core::machine::MAX_CLIENTS;
 use static_cell::{ConstStaticCell, StaticCell};
 
-/// As many as the firmware has: the stack looks through all of them at each packet.
-const CONNECTIONS: usize = (MAX_CLIENTS + 1) + (web::CONNECTIONS + 1);
+/// As many sockets as the firmware has, with those of discovery and updates: the stack looks through all of
+/// them at each packet.
+const CONNECTIONS: usize = (MAX_CLIENTS + 1) + (web::CONNECTIONS + 1) + 2;
 
 type Connections = Tcp<CONNECTIONS, 2048, 2048>;
 
