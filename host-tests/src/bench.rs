@@ -5,7 +5,7 @@ use protocol_core::arm::{Calibration, Compensation, Directions};
 use protocol_core::drawings::{ButtonDraws, Contents, Space};
 use protocol_core::lineus::{Diagnostics, Identity, Reply, Request, Session};
 use protocol_core::machine::{ArmData, Client, Errand, MAX_CLIENTS, Machine, Report, SetPoint};
-use protocol_core::motion::{Micros, Steps};
+use protocol_core::motion::{MOST_DWELL, Micros, Steps};
 use protocol_core::settings::{MachineName, Settings};
 use protocol_core::update;
 use protocol_core::wifi::{Networks, Phase, Status};
@@ -57,6 +57,8 @@ pub struct Bench {
     name: MachineName,
     frame_us: u64,
     next_us: u64,
+    /// A dwell is cut off here, so that inputs of all kinds do not stand still for hours.
+    pub longest_dwell: Micros,
     /// All set-points so far.
     pub frames: Vec<Frame>,
 }
@@ -76,6 +78,7 @@ impl Bench {
             name: MachineName::default(),
             frame_us,
             next_us: 0,
+            longest_dwell: MOST_DWELL,
             frames: Vec::new(),
         }
     }
@@ -159,6 +162,10 @@ impl Bench {
         match request {
             Request::Answered => {}
             Request::Errand(errand) => {
+                let errand = match errand {
+                    Errand::Dwell(time) => Errand::Dwell(time.min(self.longest_dwell)),
+                    other => other,
+                };
                 let report = self.errand(client, errand);
                 reply.report(&report);
                 return Some(report);

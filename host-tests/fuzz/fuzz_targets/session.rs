@@ -14,6 +14,7 @@ use host_tests::bench::{Bench, Frame};
 use host_tests::model;
 use libfuzzer_sys::fuzz_target;
 use protocol_core::arm::Calibration;
+use protocol_core::motion::Micros;
 
 /// Two frames a step, so that there are set-points between the steps.
 const FRAME_US: u64 = 5_000;
@@ -25,6 +26,7 @@ const MOST_BYTES: usize = 2048;
 fuzz_target!(|input: &[u8]| {
     let input = &input[..input.len().min(MOST_BYTES)];
     let mut bench = Bench::new(FRAME_US, Calibration::default());
+    bench.longest_dwell = Micros::from_millis(100);
     let mut sent = Vec::new();
     let mut answers = 0;
     for piece in input.split_inclusive(|byte| matches!(byte, 1 | 2)) {
