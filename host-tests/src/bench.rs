@@ -5,7 +5,7 @@ use protocol_core::arm::{Calibration, Compensation, Directions};
 use protocol_core::drawings::{ButtonDraws, Contents, Space};
 use protocol_core::lineus::{Diagnostics, Identity, Reply, Request, Session};
 use protocol_core::machine::{ArmData, Client, Errand, MAX_CLIENTS, Machine, Report, SetPoint};
-use protocol_core::motion::{MOST_DWELL, Micros, Steps};
+use protocol_core::motion::{MOST_DWELL, Micros};
 use protocol_core::settings::{MachineName, Settings};
 use protocol_core::update;
 use protocol_core::wifi::{Networks, Phase, Status};
@@ -171,11 +171,7 @@ impl Bench {
                 return Some(report);
             }
             Request::SetSpeed { pen_down, pen_up } => {
-                let now = self.machine.steps();
-                self.machine.set_steps(Steps {
-                    pen_down: pen_down.unwrap_or(now.pen_down),
-                    pen_up: pen_up.unwrap_or(now.pen_up),
-                });
+                self.machine.change_steps(pen_down, pen_up);
                 reply.ok();
             }
             Request::Position => reply.position(self.machine.position()),

@@ -34,7 +34,7 @@ pub use plotter::{NotPlanned, StopReason};
 use crate::arm::{Calibration, Compensation, Directions, Pulses};
 use crate::motion::{
     DEFAULT_STEPS, HOME, Line, MOST_DWELL, Micros, PEN_UP, PlanEvent, Planner, Position, Rapid,
-    Side, Steps, Wave, closest, hold,
+    Side, StepSize, Steps, Wave, closest, hold,
 };
 use heapless::Deque;
 use motion::{Active, Motion};
@@ -310,6 +310,12 @@ impl Machine {
     /// Sets the drawing speed of the moves that begin from now on.
     pub const fn set_steps(&mut self, steps: Steps) {
         self.steps = steps;
+    }
+
+    /// The same, of which what is not given stays (`spec 1.0.4a, G94`).
+    pub fn change_steps(&mut self, pen_down: Option<StepSize>, pen_up: Option<StepSize>) {
+        self.steps.pen_down = pen_down.unwrap_or(self.steps.pen_down);
+        self.steps.pen_up = pen_up.unwrap_or(self.steps.pen_up);
     }
 
     #[inline]

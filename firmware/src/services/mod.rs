@@ -34,7 +34,6 @@ use protocol_core::arm::Calibration;
 use protocol_core::drawings::Slot;
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client, Machine};
-use protocol_core::motion::WAVE;
 use protocol_core::settings::{MachineName, Settings};
 use storage::{Store, StoreError};
 use update::Update;
@@ -124,8 +123,8 @@ impl House {
         let greeted = self.greeted.load(Ordering::Relaxed);
         self.greeted.store(true, Ordering::Relaxed);
         if !greeted && self.wave() {
-            Timer::after_micros(WAVE.get()).await;
-            // Frames may be late, and whoever has heard the greeting takes the arm to be at home.
+            // By its end and not by its time: frames may be late, and whoever has heard the greeting takes
+            // the arm to be at home.
             while self.arm.with(|machine| machine.is_waving()) {
                 Timer::after_millis(1).await;
             }
@@ -210,7 +209,12 @@ impl House {
         let (calibration, directions) = (new.calibration, new.directions);
         let (map, shift, compensation) = (new.map, new.shift, new.compensation());
         let old = self.settings.lock(|settings| settings.replace(new));
-        self.discovery.renamed();
+        if self.settings(|new| old.name != new.name) {
+            self.discovery.renamed();
+        }
+        if self.settings(|new| old.networks != new.networks) {
+            self.wifi.changed();
+        }
         self.arm.with(|machine| {
             if old.calibration != calibration {
                 machine.set_calibration(calibration);

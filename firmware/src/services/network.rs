@@ -20,6 +20,7 @@ use heapless::Vec;
 use protocol_core::machine::Client;
 use protocol_core::motion::Micros;
 use protocol_core::panel::Gesture;
+use protocol_core::settings::Settings;
 use protocol_core::wifi::{
     Effect, Event, Heard, Job, Joined, MAX_HEARD, Network, Phase, Policy, Status,
 };
@@ -106,7 +107,7 @@ impl Wifi {
     }
 
     /// The remembered networks have changed.
-    pub fn changed(&self) {
+    pub(super) fn changed(&self) {
         self.put(Input::Changed);
     }
 
@@ -165,15 +166,14 @@ pub async fn run(house: &House, radio: impl Radio, address: impl Address) -> ! {
 async fn remember(house: &House) -> ! {
     loop {
         let network = house.wifi.joined.receive().await;
-        let put = |settings: &mut protocol_core::settings::Settings| {
-            if settings.networks.put(network.clone()).is_err() {
+        let put = |settings: &mut Settings| {
+            if settings.networks.put(network).is_err() {
                 warning!("there is no place for the network that was joined");
             }
         };
         if house.change(Client::HOUSE, put).await.is_err() {
             warning!("the network that was joined could not be stored");
         }
-        house.wifi.changed();
     }
 }
 
@@ -232,7 +232,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                 let scan = self.radio.scan(&mut self.heard);
                 match select(scan, inputs.receive()).await {
                     Either::First(scanned) => {
-                        self.keep_heard();
+                        keep_heard(&self.heard, &self.house.wifi);
                         let heard = core::mem::take(&mut self.heard);
                         self.on(Event::Scanned(scanned.is_ok().then_some(&heard)));
                         None
@@ -336,7 +336,7 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
                 if self.house.wifi.idle.load(Ordering::Relaxed)
                     && self.radio.scan(&mut self.heard).await.is_ok()
                 {
-                    self.keep_heard();
+                    keep_heard(&self.heard, &self.house.wifi);
                 }
                 self.house.wifi.listed.signal(());
             }
@@ -357,10 +357,6 @@ impl<R: Radio, A: Address> Service<'_, R, A> {
             Some(Effect::Draw) => self.house.draw_by_button(),
             None => {}
         }
-    }
-
-    fn keep_heard(&self) {
-        keep_heard(&self.heard, &self.house.wifi);
     }
 }
 

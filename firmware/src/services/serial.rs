@@ -174,7 +174,9 @@ impl<'a> Port<'a> {
         match effect {
             Effect::Stop(reason) => self.arm.stop(reason),
             Effect::Resume if self.sensors.power_off => {}
-            Effect::Resume => self.arm.with(Machine::resume),
+            Effect::Resume => {
+                self.arm.resume();
+            }
         }
     }
 

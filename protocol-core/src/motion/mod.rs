@@ -13,7 +13,7 @@ pub use planner::{
     Acceleration, Assist, Feed, Intensity, LEAST_FEED, MOST_DWELL, MOST_FEED, Outputs,
     PLAN_SEGMENTS, PenDepth, PlanData, STREAM_GAP, Segment,
 };
-pub use stepping::{DEFAULT_STEPS, STEP_TIME, StepRange, StepSize, Steps, WAVE};
+pub use stepping::{DEFAULT_STEPS, STEP_TIME, StepRange, StepSize, Steps};
 pub use table::{Direction, Millimetres, Side, Table, TablePoint, UNITS_PER_MILLIMETRE};
 pub use transform::{MAX_COORDINATE, MAX_SCALE, Transform};
 pub use units::{

@@ -279,9 +279,6 @@ impl Rapid {
     }
 }
 
-/// How long a little wave takes.
-pub const WAVE: Micros = Wave::DURATION;
-
 /// A little wave: to the left, to the right and back, twice, at the pace of a move with the pen up.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wave {

@@ -156,6 +156,13 @@ mod tests {
         [(from, true), (from + length, false)]
     }
 
+    /// A press of so many milliseconds says this, so many milliseconds after its beginning, and no more.
+    fn a_press_says(length: u64, long_press: Micros, expected: Option<(u64, Gesture)>) {
+        let said = gestures(&press(LATER, length), long_press);
+        let expected = expected.map(|(at, gesture)| (LATER + at, gesture));
+        assert_eq!(said, Vec::from_iter(expected), "{length} ms");
+    }
+
     #[test]
     fn short_and_long_presses() {
         for (length, expected) in [
@@ -165,12 +172,7 @@ mod tests {
             (1001, Some((1000, Gesture::Long))),
             (20_000, Some((1000, Gesture::Long))),
         ] {
-            let said = gestures(&press(LATER, length), LONG_PRESS);
-            let expected: Vec<_> = expected
-                .map(|(at, gesture)| (LATER + at, gesture))
-                .into_iter()
-                .collect();
-            assert_eq!(said, expected, "{length} ms");
+            a_press_says(length, LONG_PRESS, expected);
         }
     }
 
@@ -181,12 +183,7 @@ mod tests {
             (3_000, None),
             (7_100, Some((7_000, Gesture::Long))),
         ] {
-            let said = gestures(&press(LATER, length), VERY_LONG_PRESS);
-            let expected: Vec<_> = expected
-                .map(|(at, gesture)| (LATER + at, gesture))
-                .into_iter()
-                .collect();
-            assert_eq!(said, expected, "{length} ms");
+            a_press_says(length, VERY_LONG_PRESS, expected);
         }
     }
 

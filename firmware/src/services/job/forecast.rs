@@ -108,11 +108,7 @@ impl Forecast {
             match request {
                 Request::Errand(errand) => self.travel(&errand),
                 Request::SetSpeed { pen_down, pen_up } => {
-                    let now = self.machine.steps();
-                    self.machine.set_steps(Steps {
-                        pen_down: pen_down.unwrap_or(now.pen_down),
-                        pen_up: pen_up.unwrap_or(now.pen_up),
-                    });
+                    self.machine.change_steps(pen_down, pen_up);
                 }
                 _ => {}
             }

@@ -121,10 +121,6 @@ pub async fn answer(
     client: Client,
     house: &House,
 ) {
-    // By far the most lines are moves: they do not go the long way of all that a line may ask for.
-    if let Request::Errand(errand) = request {
-        return reply.report(&house.arm.errand(client, errand).await);
-    }
     if !drawings::record(request, session, reply, client, house).await {
         perform(request, reply, client, house).await;
     }

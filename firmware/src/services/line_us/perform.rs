@@ -6,7 +6,7 @@ use crate::services::update::KEY_NAME;
 use core::fmt::Display;
 use protocol_core::lineus::{Diagnostics, Refusal, Reply, Request};
 use protocol_core::machine::Client;
-use protocol_core::motion::{Micros, Steps};
+use protocol_core::motion::Micros;
 use protocol_core::settings::{MachineName, Settings};
 use protocol_core::wifi::{Full, Heard, MAX_NETWORKS, Network, Networks, Password, Ssid};
 
@@ -17,13 +17,7 @@ pub async fn perform(request: &Request, reply: &mut Reply, client: Client, house
         Request::Answered => {}
         Request::Errand(errand) => reply.report(&arm.errand(client, errand).await),
         Request::SetSpeed { pen_down, pen_up } => {
-            arm.with(|machine| {
-                let now = machine.steps();
-                machine.set_steps(Steps {
-                    pen_down: pen_down.unwrap_or(now.pen_down),
-                    pen_up: pen_up.unwrap_or(now.pen_up),
-                });
-            });
+            arm.with(|machine| machine.change_steps(*pen_down, *pen_up));
             reply.ok();
         }
         Request::Position => reply.position(arm.with(|machine| machine.position())),
@@ -61,16 +55,13 @@ pub async fn perform(request: &Request, reply: &mut Reply, client: Client, house
         Request::Remember { ssid, password } => {
             remember(ssid, password.as_ref(), reply, client, house).await;
         }
-        Request::Forget(ssid) => {
-            forget(ssid, reply, client, house).await;
-        }
+        Request::Forget(ssid) => forget(ssid, reply, client, house).await,
         Request::ForgetAll => {
             let forget = |settings: &mut Settings| {
                 settings.networks.clear();
                 Ok(())
             };
             change("networks", forget, reply, client, house).await;
-            house.wifi.changed();
         }
         Request::Update => match house.update.ask().await {
             Ok(version) => reply.updated(version),
@@ -206,7 +197,6 @@ async fn remember(
             .map_err(|Full| Refusal::TooManyNetworks)
     };
     change("network", put, reply, client, house).await;
-    house.wifi.changed();
 }
 
 /// A network for which there is a place; one that comes without a password has the one that is
@@ -233,7 +223,6 @@ async fn forget(ssid: &Ssid, reply: &mut Reply, client: Client, house: &House) {
         false => Err(Refusal::NoSuchNetwork(ssid.as_bytes())),
     };
     change("network", remove, reply, client, house).await;
-    house.wifi.changed();
 }
 
 /// Changes settings, and answers `ok`, or why not.

@@ -7,7 +7,7 @@ use crate::services::House;
 use embedded_io_async::{Read, Write};
 use heapless::String;
 use protocol_core::machine::Client;
-use protocol_core::motion::{StepRange, StepSize, Steps};
+use protocol_core::motion::{StepRange, StepSize};
 use protocol_core::settings::{
     AccessPointName, AllowedOrigin, MAX_NAME, MAX_ORIGIN, MachineName, StartMode,
 };
@@ -219,12 +219,8 @@ pub async fn change<S: Read + Write>(
         });
         outcome.await.map_err(|error| Failure::not_stored(&error))?;
     }
-    house.arm.with(|machine| {
-        let now = machine.steps();
-        machine.set_steps(Steps {
-            pen_down: change.pen_down.unwrap_or(now.pen_down),
-            pen_up: change.pen_up.unwrap_or(now.pen_up),
-        });
-    });
+    house
+        .arm
+        .with(|machine| machine.change_steps(change.pen_down, change.pen_up));
     give(exchange, house).await
 }
