@@ -85,8 +85,8 @@ fn verify(manifest: &str, key: &VerifyingKey) -> Result<()> {
     }
 }
 
-/// Image, manifest and checksums of a release, in `folder`: what a web server has to serve. Gives the
-/// manifest's file.
+/// Image, manifest and checksums of a release, in `folder`: what a web server has to serve; and manifest and
+/// image in one file, for an arm's page. Gives the manifest's file.
 pub fn release(
     board: &str,
     version: Version,
@@ -101,11 +101,18 @@ pub fn release(
     let text = manifest(board, version, &file, key)?;
     let place = folder.join(format!("{board}.txt"));
     fs::write(&place, &text).with_context(|| place.display().to_string())?;
-    let sums = format!(
-        "{}  {name}\n{}  {board}.txt\n",
-        hex(&Sha256::digest(image)),
-        hex(&Sha256::digest(text.as_bytes())),
-    );
+    let one = [text.as_bytes(), image].concat();
+    let one_name = format!("quill-{version}-{board}.update");
+    let one_file = folder.join(&one_name);
+    fs::write(&one_file, &one).with_context(|| one_file.display().to_string())?;
+    let sums: String = [
+        (&*name, image),
+        (&*format!("{board}.txt"), text.as_bytes()),
+        (&*one_name, &*one),
+    ]
+    .iter()
+    .map(|(name, content)| format!("{}  {name}\n", hex(&Sha256::digest(content))))
+    .collect();
     let checksums = folder.join(format!("{board}.sha256"));
     fs::write(&checksums, sums).with_context(|| checksums.display().to_string())?;
     Ok(place)
@@ -135,6 +142,7 @@ fn hex(bytes: &[u8]) -> String {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use protocol_core::update::manifest_end;
 
     #[test]
     fn a_key_is_made_once_and_for_its_owner_alone() {
@@ -171,8 +179,12 @@ mod tests {
         );
         let served = fs::read(folder.path().join(manifest.image.as_str())).unwrap();
         assert_eq!(served, image);
+        let one = fs::read(folder.path().join("quill-0.2.0-virt.update")).unwrap();
+        let end = manifest_end(&one).unwrap();
+        assert_eq!((&one[..end], &one[end..]), (text.as_bytes(), &*image));
         let sums = fs::read_to_string(folder.path().join("virt.sha256")).unwrap();
         assert!(sums.starts_with(&hex(&manifest.sha256)), "{sums}");
+        assert_eq!(sums.lines().count(), 3);
         assert!(verify(&text, &key.verifying_key()).is_ok());
         let other = SigningKey::from_bytes(&[4; 32]);
         assert!(verify(&text, &other.verifying_key()).is_err());

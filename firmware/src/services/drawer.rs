@@ -108,12 +108,17 @@ impl Drawer {
 
     /// Stops what is being drawn, if anything is, and lifts the pen; says whether something was.
     pub fn stop(&self) -> bool {
-        let drawing = self.state().drawing.is_some();
+        let drawing = self.is_drawing();
         if drawing {
             // While something is drawn, orders are taken at once: there is a place.
             let _ = self.orders.try_send(Order::Stop);
         }
         drawing
+    }
+
+    /// Whether one is being drawn, or will be.
+    pub fn is_drawing(&self) -> bool {
+        self.state().drawing.is_some()
     }
 
     /// What was drawn from memory last.

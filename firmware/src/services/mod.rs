@@ -112,6 +112,12 @@ impl House {
         self.settings(|settings| settings.name.clone())
     }
 
+    /// Whether something is drawn from memory or by the web interface, paused included, or is recorded.
+    fn has_drawing_under_way(&self) -> bool {
+        let job = self.job.state().is_some_and(job::State::is_under_way);
+        job || self.drawer.is_drawing() || self.drawings.is_recording()
+    }
+
     /// A little wave, if the arm is to make any and has nothing else to do; says whether it makes one.
     fn wave(&self) -> bool {
         self.settings(|settings| settings.waves) && self.arm.wave()

@@ -6,7 +6,8 @@ use crate::chip::{Chip, ChipError};
 use crate::server::Server;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_futures::block_on;
-use embassy_time::{Duration, Instant};
+use embassy_futures::select::{Either, select};
+use embassy_time::{Duration, Instant, Timer};
 use embedded_storage_async::nor_flash::{ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash};
 use firmware::board::{FirmwareSlots, Servos, Vitals};
 use firmware::boards::desktop::clock::HandTime;
@@ -278,6 +279,42 @@ impl Machine {
         self.tasks.spawner().spawn(async move {
             let result = house.update.ask().await;
             place.replace(Some(result));
+        });
+        outcome
+    }
+
+    /// Hands over a file, a piece of some bytes a second, and gives where its outcome will be. Whoever hands over goes
+    /// away after the last piece where `leaves` says so.
+    pub fn hand_over(
+        &mut self,
+        manifest: &str,
+        length: usize,
+        image: &[u8],
+        leaves: bool,
+    ) -> Rc<RefCell<Option<Result<Version, Rejection>>>> {
+        let outcome = Rc::new(RefCell::new(None));
+        let (house, place) = (self.house.clone(), outcome.clone());
+        let (manifest, image) = (manifest.to_owned(), image.to_vec());
+        self.tasks.spawner().spawn(async move {
+            let handover = match house.update.offer(manifest.as_bytes(), length as u32) {
+                Ok(handover) => handover,
+                Err(rejection) => {
+                    place.replace(Some(Err(rejection)));
+                    return;
+                }
+            };
+            let pieces = async {
+                for piece in image.chunks(700) {
+                    handover.push(piece).await;
+                    Timer::after_secs(1).await;
+                }
+                if !leaves {
+                    std::future::pending::<()>().await;
+                }
+            };
+            if let Either::First(outcome) = select(handover.outcome(), pieces).await {
+                place.replace(Some(outcome));
+            }
         });
         outcome
     }

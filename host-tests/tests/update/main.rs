@@ -8,6 +8,7 @@ mod cuts;
 #[allow(dead_code, reason = "only tears are thrown here")]
 mod dice;
 mod machine;
+mod offers;
 mod refusals;
 mod release;
 mod server;

@@ -183,7 +183,7 @@ fn a_wrong_length() {
     for served in [SIZE - 1, SIZE + 1] {
         let rejection = refused_with(IMAGE, Answer::file(&vec![0; served]));
         let expected = Rejection::WrongLength {
-            served: served as u32,
+            offered: served as u32,
             expected: LENGTH,
         };
         assert_eq!(rejection, expected);
@@ -255,7 +255,7 @@ fn an_endless_answer() {
     assert_eq!(rejection, Rejection::LongManifest(u32::MAX));
     let rejection = refused_with(IMAGE, endless(huge));
     let expected = Rejection::WrongLength {
-        served: u32::MAX,
+        offered: u32::MAX,
         expected: LENGTH,
     };
     assert_eq!(rejection, expected);

@@ -328,3 +328,20 @@ fn what_is_not_there() {
         assert_eq!(answer.error(), (status, word.to_owned()), "{method} {path}");
     }
 }
+
+#[test]
+fn firmware_where_there_is_no_place_for_it() {
+    let (desktop, _folder) = arm(&[]);
+    let web = desktop.web();
+    // All of it is taken before the answer, so that a browser hears it.
+    for body in [String::new(), "no manifest".into(), "x".repeat(300_000)] {
+        let answer = web.post("/api/update", &body);
+        assert_eq!(answer.error(), (422, "refused_update".into()));
+        let message = answer.json()["message"].clone();
+        assert_eq!(message, "this board has no place for another firmware");
+    }
+    assert_eq!(web.get("/api").json()["update_key"], "development");
+    let update = web.get("/api/state").json()["update"].clone();
+    let expected = json!({"phase": "idle", "version": null, "percent": null, "words": "none"});
+    assert_eq!(update, expected);
+}

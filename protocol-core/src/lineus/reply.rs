@@ -768,7 +768,7 @@ mod tests {
                     progress: update::Progress::Idle,
                     standing: update::Standing::Settled,
                     refused: Some(update::Rejection::WrongLength {
-                        served: u32::MAX,
+                        offered: u32::MAX,
                         expected: u32::MAX,
                     }),
                 },

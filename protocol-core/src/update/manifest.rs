@@ -140,6 +140,12 @@ impl Manifest<'_> {
     }
 }
 
+/// Where a manifest ends that is at the beginning of something: behind its last line. `None` if that is not there.
+pub fn manifest_end(bytes: &[u8]) -> Option<usize> {
+    let mut ends = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n');
+    ends.nth(usize::from(LINES) - 1).map(|(last, _)| last + 1)
+}
+
 /// Takes line after line.
 struct Lines<'a> {
     rest: &'a [u8],
@@ -346,6 +352,18 @@ mod tests {
         );
         assert!(Unverified::parse(long.as_bytes()).is_ok());
         assert!(long.len() <= MAX_MANIFEST, "{}", long.len());
+    }
+
+    #[test]
+    fn an_image_behind_a_manifest() {
+        let text = text();
+        let end = text.len();
+        for image in ["", "\n", "image\n\n"] {
+            let file = format!("{text}{image}");
+            assert_eq!(manifest_end(file.as_bytes()), Some(end), "{image:?}");
+        }
+        assert_eq!(manifest_end(text[..end - 1].as_bytes()), None);
+        assert_eq!(manifest_end(b""), None);
     }
 
     proptest! {

@@ -17,6 +17,7 @@ pub use download::{
 };
 pub use manifest::{
     Hash, MAX_BOARD, MAX_MANIFEST, Manifest, Running, Signature, Unverified, hexadecimal,
+    manifest_end,
 };
 pub use probation::{PATIENCE, Probation, STEADY, Signs, Verdict};
 pub use rejection::Rejection;

@@ -16,7 +16,7 @@ pub enum Rejection {
     /// The running firmware is new and has not confirmed itself: what would be overwritten is the one to
     /// come back to.
     OnTrial,
-    /// The arm is drawing, or its pen is down, and that does not end.
+    /// Something is drawn, paused or recorded, or the pen is down, and that does not end.
     Drawing,
     /// The host's name is not known.
     UnknownHost,
@@ -31,7 +31,7 @@ pub enum Rejection {
         /// Bytes that should have.
         expected: u32,
     },
-    /// The server has been silent for too long.
+    /// Nothing has come for too long.
     Silent,
     /// It takes too long as a whole.
     Slow(Micros),
@@ -62,10 +62,10 @@ pub enum Rejection {
         /// Bytes of the slot.
         slot: u32,
     },
-    /// The server's image is not as long as the manifest says.
+    /// The image that is offered is not as long as the manifest says.
     WrongLength {
-        /// Bytes that the server has.
-        served: u32,
+        /// Bytes that are offered.
+        offered: u32,
         /// Bytes that the manifest says.
         expected: u32,
     },
@@ -84,7 +84,7 @@ impl fmt::Display for Rejection {
             Self::NoAddress => out.write_str("no address is kept for updates, M997 S sets one"),
             Self::UnderWay => out.write_str("an update is under way"),
             Self::OnTrial => out.write_str("the firmware is on trial, try again in a minute"),
-            Self::Drawing => out.write_str("the arm is drawing, or its pen is down"),
+            Self::Drawing => out.write_str("a drawing is under way, or the pen is down"),
             Self::UnknownHost => out.write_str("the server's name is not known"),
             Self::NoServer => out.write_str("no connection to the server"),
             Self::NoAnswer => out.write_str("the server ends the connection without an answer"),
@@ -94,7 +94,7 @@ impl fmt::Display for Rejection {
                     "the download ended after {received} of {expected} bytes"
                 )
             }
-            Self::Silent => out.write_str("the server has gone silent"),
+            Self::Silent => out.write_str("the sender has gone silent"),
             Self::Slow(limit) => {
                 write!(out, "it took longer than {} s", limit.get() / 1_000_000)
             }
@@ -116,9 +116,9 @@ impl fmt::Display for Rejection {
             Self::WrongSize { image, slot } => {
                 write!(out, "the image has {image} bytes, the slot {slot}")
             }
-            Self::WrongLength { served, expected } => write!(
+            Self::WrongLength { offered, expected } => write!(
                 out,
-                "the server's image has {served} bytes, the signed one {expected}"
+                "the image has {offered} bytes, the signed one {expected}"
             ),
             Self::WrongHash => out.write_str("the image is not the signed one"),
             Self::FlashDiffers => out.write_str("the flash does not hold what was written"),

@@ -153,6 +153,11 @@ impl Drawings {
         self.desk(|desk| desk.space)
     }
 
+    /// Whether a client records one.
+    pub fn is_recording(&self) -> bool {
+        self.desk(|desk| desk.recording.is_some())
+    }
+
     /// A drawing to be read from its beginning; `None` if there is none in this slot.
     pub fn open(&self, slot: Slot) -> Option<Reader<'_>> {
         let stored = self.desk(|desk| desk.stored.get(slot.index()).copied().flatten());

@@ -3,6 +3,7 @@
 //! The heads are read by `httparse`. The client of `edge-http` 0.8, which is built on it, panics where a
 //! server sends a length that is no number (`Headers::content_len`).
 
+use super::body::{Body, Origin};
 use super::{duration, now};
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use edge_nal::{AddrType, Dns, TcpConnect};
@@ -11,8 +12,8 @@ use embedded_io_async::{Read, Write};
 use httparse::{EMPTY_HEADER, Response};
 use protocol_core::motion::Micros;
 use protocol_core::update::{
-    Download, Head, MANIFEST_TIME, MAX_HEAD, MAX_HEADERS, MAX_MANIFEST, ManifestAddress, Rejection,
-    SILENCE,
+    Download, Head, IMAGE_TIME, ImageName, MANIFEST_TIME, MAX_HEAD, MAX_HEADERS, MAX_MANIFEST,
+    ManifestAddress, Rejection, SILENCE,
 };
 
 /// What ends a head.
@@ -62,8 +63,13 @@ impl<'a, N: TcpConnect + Dns> Server<'a, N> {
         Ok(text)
     }
 
+    /// Asks for the image beside the manifest.
+    pub async fn image(&self, name: &ImageName) -> Result<Body<'_, N::Socket<'_>>, Rejection> {
+        self.get(&self.address.beside(name), IMAGE_TIME).await
+    }
+
     /// Asks for a file; all of it has to come within `limit`.
-    pub async fn get(&self, path: &str, limit: Micros) -> Result<Body<N::Socket<'_>>, Rejection> {
+    async fn get(&self, path: &str, limit: Micros) -> Result<Body<'_, N::Socket<'_>>, Rejection> {
         let download = Download::begin(now(), limit);
         let ask = async {
             let connection = with_timeout(duration(SILENCE), self.network.connect(self.place));
@@ -79,8 +85,7 @@ impl<'a, N: TcpConnect + Dns> Server<'a, N> {
         match with_timeout(duration(MANIFEST_TIME), ask).await {
             Ok(answer) => {
                 let (socket, length) = answer?;
-                let download = download.of(length);
-                Ok(Body { socket, download })
+                Ok(Body::new(Origin::Server(socket), download.of(length)))
             }
             Err(_) => Err(Rejection::Silent),
         }
@@ -128,39 +133,4 @@ async fn head<S: Read>(socket: &mut S) -> Result<u32, Rejection> {
         head.header(header.name, header.value);
     }
     head.length()
-}
-
-/// What a server sends.
-pub struct Body<S> {
-    socket: S,
-    download: Download,
-}
-
-impl<S: Read> Body<S> {
-    /// Bytes of all of it.
-    pub const fn length(&self) -> u32 {
-        self.download.expected()
-    }
-
-    /// How much has come, in percent.
-    pub fn percent(&self) -> u8 {
-        self.download.percent()
-    }
-
-    /// The next bytes, at least one; 0 when all have come.
-    pub async fn read(&mut self, into: &mut [u8]) -> Result<usize, Rejection> {
-        let most = into.len().min(self.download.missing() as usize);
-        let Some(into @ [_, ..]) = into.get_mut(..most) else {
-            return Ok(0);
-        };
-        let patience = duration(self.download.patience(now())?);
-        let count = match with_timeout(patience, self.socket.read(into)).await {
-            Ok(Ok(count)) => count,
-            // A connection that breaks has ended.
-            Ok(Err(_)) => 0,
-            Err(_) => return Err(self.download.timed_out(now())),
-        };
-        self.download.take(count as u32)?;
-        Ok(count)
-    }
 }

@@ -1,6 +1,6 @@
 //! From the network into a slot, and read back from it.
 
-use super::fetch::Body;
+use super::body::Body;
 use embedded_io_async::Read;
 use embedded_storage_async::nor_flash::{NorFlash, ReadNorFlash};
 use protocol_core::update::{Manifest, Rejection};
@@ -15,7 +15,7 @@ struct Piece([u8; PIECE]);
 
 /// Writes an image into a slot, erasing page after page ahead of it.
 pub async fn write<S: Read, F: NorFlash>(
-    image: &mut Body<S>,
+    image: &mut Body<'_, S>,
     slot: &mut F,
     manifest: &Manifest<'_>,
     mut show: impl FnMut(u8),
@@ -50,7 +50,7 @@ pub async fn write<S: Read, F: NorFlash>(
 }
 
 /// Fills the piece, unless the image ends in it.
-async fn fill<S: Read>(image: &mut Body<S>, piece: &mut [u8]) -> Result<usize, Rejection> {
+async fn fill<S: Read>(image: &mut Body<'_, S>, piece: &mut [u8]) -> Result<usize, Rejection> {
     let mut filled = 0;
     while let Some(free @ [_, ..]) = piece.get_mut(filled..) {
         match image.read(free).await? {

@@ -4,7 +4,7 @@ use super::exchange::{Answer, Exchange, Trouble};
 use super::failure::Status;
 use super::request::{Request, What};
 use super::state::with_state;
-use super::{by_hand, drawing, networks, page, settings, state};
+use super::{by_hand, drawing, networks, page, settings, state, update};
 use crate::services::House;
 use embedded_io_async::{Read, Write};
 use protocol_core::machine::Client;
@@ -58,6 +58,7 @@ async fn serve<S: Read + Write>(
         What::Networks => networks::give(exchange, house).await,
         What::AddNetwork => networks::add(exchange, client, house).await,
         What::ForgetNetwork => networks::forget(exchange, client, house).await,
+        What::Update => update::take(exchange, house).await,
         What::Preflight => {
             let answer = Answer {
                 headers: "Access-Control-Allow-Methods: GET, POST, PATCH, DELETE\r\n\

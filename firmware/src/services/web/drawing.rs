@@ -7,6 +7,7 @@ use super::state::JobState;
 use crate::services::House;
 use crate::services::job::NotNow;
 use embedded_io_async::{Read, Write};
+use protocol_core::update::Rejection;
 use serde::Deserialize;
 
 /// Takes a drawing, or a piece of one.
@@ -21,6 +22,9 @@ pub async fn upload<S: Read + Write>(
         What::Begin => {
             if length == 0 {
                 return Err(Failure::bad_value(format_args!("the drawing is empty")).into());
+            }
+            if house.update.is_under_way() {
+                return Err(Rejection::UnderWay.into());
             }
             let mut title = query.title;
             if title.name.is_empty() {

@@ -4,6 +4,7 @@ use super::failure::{Failure, Status};
 use super::request::too_large;
 use super::{MAX_BODY, MAX_HEAD, PATIENCE};
 use core::fmt::Write as _;
+use core::ops::Range;
 use embassy_time::with_timeout;
 use embedded_io_async::{Read, Write};
 use heapless::String;
@@ -130,6 +131,13 @@ impl<S: Read + Write> Exchange<'_, S> {
         self.left -= taken;
         self.here = 0;
         Ok(self.room.get(..taken).unwrap_or_default())
+    }
+
+    /// A part of the last piece, up to its end, comes again as the next one.
+    pub fn put_back(&mut self, part: Range<usize>) {
+        self.left += part.len();
+        self.here = part.len();
+        self.room.copy_within(part, 0);
     }
 
     /// Answers with JSON.

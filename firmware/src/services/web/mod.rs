@@ -29,6 +29,7 @@ mod query;
 mod request;
 mod settings;
 mod state;
+mod update;
 
 pub use page::PAGE_SIZE;
 
@@ -62,7 +63,7 @@ pub const MAX_BODY: usize = 512;
 /// How long the machine waits for a head, a short body, the next piece of a drawing, or for a client to take
 /// something.
 pub const PATIENCE: Duration = Duration::from_secs(5);
-/// How long a request and its answer may take in all, WebSockets excepted.
+/// How long a request and its answer may take in all, WebSockets and updates excepted.
 const IN_ALL: Duration = Duration::from_secs(60);
 /// How long a client has to close after its answer.
 const FAREWELL: Duration = Duration::from_secs(1);
@@ -162,8 +163,12 @@ impl Server {
                 ..
             }) => self.upgrade(exchange, accept, what, client, house).await,
             Ok(request) => {
+                let limit = match request.what {
+                    What::Update => update::IN_ALL,
+                    _ => IN_ALL,
+                };
                 let answer = api::answer(&mut exchange, request, client, house);
-                with_timeout(IN_ALL, answer).await.unwrap_or(Ok(()))
+                with_timeout(limit, answer).await.unwrap_or(Ok(()))
             }
         };
     }

@@ -37,12 +37,13 @@ pub enum What {
     Networks,
     AddNetwork,
     ForgetNetwork,
+    Update,
     /// What a browser asks before it lets a page from elsewhere ask.
     Preflight,
 }
 
 /// Method, path, and what that is.
-const ROUTES: [(&str, &str, What); 21] = [
+const ROUTES: [(&str, &str, What); 22] = [
     ("GET", "/", What::Page),
     ("GET", "/index.html", What::Page),
     ("GET", "/api", What::Machine),
@@ -64,6 +65,7 @@ const ROUTES: [(&str, &str, What); 21] = [
     ("GET", "/api/networks", What::Networks),
     ("POST", "/api/networks", What::AddNetwork),
     ("POST", "/api/networks/forget", What::ForgetNetwork),
+    ("POST", "/api/update", What::Update),
 ];
 
 /// Base64 of a SHA-1, as a WebSocket is accepted with.

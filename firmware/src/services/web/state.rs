@@ -5,6 +5,7 @@ use super::{MAX_BODY, SOCKETS};
 use crate::services::House;
 use crate::services::job::{self, Report};
 use crate::services::storage::MemoryHealth;
+use crate::services::update::KEY_NAME;
 use crate::services::web::query::MAX_NAME_CHARACTERS;
 use core::fmt;
 use core::net::IpAddr;
@@ -17,6 +18,7 @@ use protocol_core::motion::{
 };
 use protocol_core::settings::MachineName;
 use protocol_core::text::MAX_LINE;
+use protocol_core::update::{self, KeyName, Progress, Version};
 use protocol_core::wifi::{Joined, MAX_NETWORKS, Phase, Status};
 use serde::{Serialize, Serializer};
 
@@ -90,6 +92,8 @@ impl From<Steps> for Speed {
 pub struct Machine<'a> {
     name: &'a str,
     version: &'static str,
+    firmware: Words<Version>,
+    update_key: Words<KeyName>,
     serial: u32,
     units_per_mm: u32,
     home: Place,
@@ -143,6 +147,8 @@ pub fn machine<'a>(name: &'a MachineName, house: &House) -> Machine<'a> {
     Machine {
         name: name.as_str(),
         version: VERSION,
+        firmware: Words(Version::FIRMWARE),
+        update_key: Words(KEY_NAME),
         serial: house.identity.serial(),
         units_per_mm: 20,
         home: HOME.into(),
@@ -198,6 +204,7 @@ pub struct Snapshot {
     clients: u8,
     memory: MemoryHealth,
     last_panic: &'static str,
+    update: update::Status,
     pub job: Option<Report>,
 }
 
@@ -225,6 +232,7 @@ impl Snapshot {
             clients: house.clients.load(Ordering::Relaxed),
             memory: house.store.health(),
             last_panic: house.vitals.last_panic,
+            update: house.update.status(),
             job: house.job.report(),
         }
     }
@@ -246,7 +254,35 @@ pub struct State<'a> {
     clients: u8,
     memory: &'static str,
     problems: &'a [Problem<'a>],
+    update: UpdateState,
     job: Option<JobState<'a>>,
+}
+
+#[derive(Serialize)]
+struct UpdateState {
+    phase: &'static str,
+    version: Option<Words<Version>>,
+    percent: Option<u8>,
+    words: Words<update::Status>,
+}
+
+impl From<update::Status> for UpdateState {
+    fn from(status: update::Status) -> Self {
+        let (phase, version, percent) = match status.progress {
+            Progress::Idle => ("idle", None, None),
+            Progress::Asking => ("asking", None, None),
+            Progress::Waiting(version) => ("waiting", Some(version), None),
+            Progress::Loading { version, percent } => ("loading", Some(version), Some(percent)),
+            Progress::Checking(version) => ("checking", Some(version), None),
+            Progress::Restarting(version) => ("starting", Some(version), None),
+        };
+        Self {
+            phase,
+            version: version.map(Words),
+            percent,
+            words: Words(status),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -446,6 +482,7 @@ fn state<'a>(
         clients: snapshot.clients,
         memory: snapshot.memory.text(),
         problems,
+        update: snapshot.update.into(),
         job: snapshot.job.as_ref().map(JobState::from),
     }
 }
@@ -496,6 +533,13 @@ mod tests {
             clients: u8::MAX,
             memory: MemoryHealth::Single,
             last_panic: &"\"".repeat(200).leak()[..],
+            update: update::Status {
+                refused: Some(update::Rejection::WrongLength {
+                    offered: u32::MAX,
+                    expected: u32::MAX,
+                }),
+                ..update::Status::NONE
+            },
             job: Some(Report {
                 id: u32::MAX,
                 name: heapless::String::try_from("\u{1f4}".repeat(32).as_str()).unwrap(),
