@@ -27,7 +27,7 @@ const _: () = assert!(
         <= MAX_REPLY
 );
 /// Version in the greeting: the level of the original's protocol that is complete, then our own.
-pub const VERSION: &str = concat!("1.0.4 Quill ", env!("QUILL_VERSION"));
+pub const VERSION: &str = concat!("3.2.0 Quill ", env!("QUILL_VERSION"));
 
 /// Longest piece of a panic's text that diagnostics tell, in characters.
 const MAX_PANIC: usize = 120;
