@@ -160,7 +160,7 @@ impl Bench {
 
     fn perform(&mut self, request: Request, client: u8, reply: &mut Reply) -> Option<Report> {
         match request {
-            Request::Answered => {}
+            Request::Answered | Request::HangUp => {}
             Request::Errand(errand) => {
                 let errand = match errand {
                     Errand::Dwell(time) => Errand::Dwell(time.min(self.longest_dwell)),

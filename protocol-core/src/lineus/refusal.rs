@@ -13,6 +13,8 @@ use core::fmt;
 pub enum Refusal<'a> {
     /// The line is too long.
     TooLong,
+    /// The line is part of a web browser's request.
+    Http,
     /// The line is no words.
     Words(WordError<'a>),
     /// An M code of the original's that no document tells the meaning of.
@@ -85,6 +87,7 @@ impl fmt::Display for Refusal<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::TooLong => write!(out, "line longer than {MAX_LINE} bytes"),
+            Self::Http => out.write_str("this is HTTP: the arm's page is at another port"),
             Self::Words(error) => words(error, out),
             Self::Reserved(number) => write!(out, "M{number} is reserved and does nothing here"),
             Self::NotHere(code) => write!(out, "M{code} is refused over the WebSocket"),

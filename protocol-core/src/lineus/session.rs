@@ -19,6 +19,9 @@ use heapless::Vec;
 pub enum Request {
     /// Nothing more to do: the reply has been written.
     Answered,
+    /// The same, and nothing more of this connection is to be executed: a browser sends what some page
+    /// from elsewhere made up, and commands would come next.
+    HangUp,
     /// To be answered by [`Reply::report`].
     Errand(Errand),
     /// To be answered by [`Reply::ok`].
@@ -198,16 +201,34 @@ impl Session {
         if self.recording {
             return Some(recording::request(line, &mut self.recorded, reply));
         }
-        let command = line.and_then(parse);
+        let command = line.and_then(|line| {
+            parse(line).map_err(|refusal| match is_http(line) {
+                true => Refusal::Http,
+                false => refusal,
+            })
+        });
         Some(match command {
             // By reference: commands are large, and copying one costs as much as reading it.
             Ok(command) => request(&mut self.transform, &command, reply),
             Err(refusal) => {
                 reply.refuse(&refusal);
-                Request::Answered
+                match refusal {
+                    Refusal::Http => Request::HangUp,
+                    _ => Request::Answered,
+                }
             }
         })
     }
+}
+
+/// Whether a line that is no command is the request line or a header of HTTP. Browsers send some headers whose
+/// length no page has in its hands, so one of them is seen before the body, whatever else is too long for a
+/// line.
+fn is_http(line: &[u8]) -> bool {
+    let is_name = |byte: &u8| byte.is_ascii_alphabetic() || *byte == b'-';
+    let colon = line.iter().position(|byte| !is_name(byte));
+    let is_header = colon.is_some_and(|at| at > 1 && line.get(at..at + 2) == Some(b": "));
+    is_header || line.ends_with(b" HTTP/1.1") || line.ends_with(b" HTTP/1.0")
 }
 
 fn allowed(line: &[u8]) -> Result<(), Refusal<'_>> {
@@ -384,6 +405,40 @@ mod tests {
         let rapid = Errand::Move(Manner::Rapid, target(Some(5.0), None, None));
         assert_eq!(only("G0 X5").0, Request::Errand(rapid));
         assert_eq!(only("G00 X5").0, Request::Errand(rapid));
+    }
+
+    #[test]
+    fn a_browser_is_hung_up_on_before_its_body() {
+        let long = "a".repeat(300);
+        for head in [
+            "POST / HTTP/1.1".into(),
+            "GET /?G01 HTTP/1.0".into(),
+            std::format!("PUT /{long} HTTP/1.1\r\nHost: {long}\r\nConnection: keep-alive"),
+            std::format!("POST /{long} HTTP/1.1\r\nHost: {long}\r\nsec-ch-ua-mobile: ?0"),
+        ] {
+            let stream = std::format!("{head}\r\n\r\nM171 SCONFIRM\n");
+            let found = requests(&mut Session::new(), stream.as_bytes());
+            let hung_up = found
+                .iter()
+                .position(|(request, _)| *request == Request::HangUp);
+            let hung_up = hung_up.unwrap_or_else(|| panic!("{head}: {found:?}"));
+            for (request, reply) in &found[..hung_up] {
+                assert!(
+                    *request == Request::Answered && reply.contains("longer"),
+                    "{head}"
+                );
+            }
+        }
+        for line in [
+            "G01 X1: 2",
+            "a b: c",
+            ": ",
+            "x: ",
+            "HTTP/1.1",
+            "G01 X100 HTTP/1.1Z",
+        ] {
+            assert_eq!(only(line).0, Request::Answered, "{line}");
+        }
     }
 
     #[test]

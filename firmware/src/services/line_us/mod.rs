@@ -134,11 +134,14 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
-    while let Ok(length @ 1..) = answers.read(&mut chunk).await {
+    'connected: while let Ok(length @ 1..) = answers.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
         while let Some(request) = session.next_request(&mut input, &mut reply) {
             answer(&request, &mut session, &mut reply, client, house).await;
             answers.send(&reply).await;
+            if request == Request::HangUp {
+                break 'connected;
+            }
         }
         // A client that sends faster than it is served would else keep everybody waiting.
         if length == CHUNK {

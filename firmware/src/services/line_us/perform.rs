@@ -14,7 +14,7 @@ use protocol_core::wifi::{Full, Heard, MAX_NETWORKS, Network, Networks, Password
 pub async fn perform(request: &Request, reply: &mut Reply, client: Client, house: &House) {
     let arm = &house.arm;
     match request {
-        Request::Answered => {}
+        Request::Answered | Request::HangUp => {}
         Request::Errand(errand) => reply.report(&arm.errand(client, errand).await),
         Request::SetSpeed { pen_down, pen_up } => {
             arm.with(|machine| machine.change_steps(*pen_down, *pen_up));
