@@ -362,7 +362,7 @@ mod tests {
             let file = format!("{text}{image}");
             assert_eq!(manifest_end(file.as_bytes()), Some(end), "{image:?}");
         }
-        assert_eq!(manifest_end(text[..end - 1].as_bytes()), None);
+        assert_eq!(manifest_end(&text.as_bytes()[..end - 1]), None);
         assert_eq!(manifest_end(b""), None);
     }
 
