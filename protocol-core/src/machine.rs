@@ -214,7 +214,8 @@ impl Machine {
     }
 
     /// The set-point of the servo frame at `now`; the time never goes back.
-    #[inline]
+    // Never part of its caller, which is compiled for size on chips.
+    #[inline(never)]
     pub fn tick(&mut self, now: Micros) -> SetPoint {
         let was_moving = self.is_moving();
         if self.active.is_some() || !self.plan.lasts_beyond(now) {
