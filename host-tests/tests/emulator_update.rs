@@ -1,7 +1,7 @@
 //! The emulated machine updates itself over its network from one build to another, stays there if that works,
 //! and is back if it does not. The emulator's driver is bootloader and watchdog.
 
-use host_tests::desktop::Client;
+use host_tests::desktop::{Client, Web};
 use protocol_core::update::Version;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -58,6 +58,7 @@ fn serve(folder: PathBuf) -> u16 {
 struct Bench {
     folder: TempDir,
     address: SocketAddr,
+    web: SocketAddr,
     port: u16,
 }
 
@@ -71,6 +72,7 @@ impl Bench {
         release::release("virt", version, &image, &key, &served).unwrap();
         Self {
             address: free_address().unwrap(),
+            web: free_address().unwrap(),
             port: serve(served),
             folder,
         }
@@ -83,7 +85,7 @@ impl Bench {
             flash: self.folder.path().join("flash"),
             time: Time::Wall,
             serial: None,
-            web: None,
+            web: Some(self.web),
         };
         Emulator::boot(&firmware("QUILL_VIRT_FIRMWARE"), &options).unwrap()
     }
@@ -98,15 +100,43 @@ impl Bench {
         (emulator, client)
     }
 
-    /// Updates the machine, and waits until it has switched itself off.
-    fn update(&self) {
-        let (mut emulator, mut client) = self.start();
-        assert!(!is_new(&mut client));
+    fn tell_address(&self, client: &mut Client) {
         let address = format!("http://10.0.2.2:{}/virt.txt", self.port);
         assert_eq!(client.say(&format!("M997 S\"{address}\"")), "ok ");
+    }
+
+    /// Updates the machine from the server, and waits until it has switched itself off.
+    fn update_from_server(&self) {
+        let (mut emulator, mut client) = self.start();
+        assert!(!is_new(&mut client));
+        self.tell_address(&mut client);
         assert_eq!(
             client.say("M997"),
             format!("ok INFO:\"{NEW} is in place and starts now\"")
+        );
+        let status = emulator.wait_off(PATIENCE).unwrap();
+        assert_eq!(status.code(), Some(RESTART));
+    }
+
+    /// The same from a file, as a page hands it over: first one that is not what was signed.
+    fn update_from_file(&self) {
+        let (mut emulator, mut client) = self.start();
+        assert!(!is_new(&mut client));
+        let file = format!("served/quill-{NEW}-virt.update");
+        let good = fs::read(self.folder.path().join(file)).unwrap();
+        let mut wrong = good.clone();
+        *wrong.last_mut().unwrap() ^= 1;
+        let send = |file: &[u8]| Web::at(self.web).request("POST", "/api/update", "", file);
+        let answer = send(&wrong);
+        assert_eq!(answer.error(), (422, "refused_update".into()));
+        assert_eq!(
+            told(&mut client),
+            "refused: the image is not the signed one"
+        );
+        let answer = send(&good);
+        assert_eq!(
+            (answer.status, &answer.json()["version"]),
+            (200, &NEW.into())
         );
         let status = emulator.wait_off(PATIENCE).unwrap();
         assert_eq!(status.code(), Some(RESTART));
@@ -129,7 +159,7 @@ fn told(client: &mut Client) -> String {
 #[test]
 fn a_new_firmware_that_hangs_three_times_is_gone() {
     let bench = Bench::new();
-    bench.update();
+    bench.update_from_server();
     for _ in 0..3 {
         let mut emulator = bench.boot();
         emulator.wait_for_line("Line-us clients", PATIENCE).unwrap();
@@ -156,7 +186,7 @@ fn a_new_firmware_that_hangs_three_times_is_gone() {
 #[test]
 fn a_new_firmware_that_works_stays() {
     let bench = Bench::new();
-    bench.update();
+    bench.update_from_file();
     let (emulator, mut client) = bench.start();
     assert!(is_new(&mut client));
     // Ten good seconds, and some for a busy computer.
@@ -178,6 +208,7 @@ fn a_new_firmware_that_works_stays() {
     }
     // What runs already is not loaded again.
     let (_emulator, mut client) = bench.start();
+    bench.tell_address(&mut client);
     assert_eq!(
         client.say("M997"),
         format!("error INFO:\"{NEW} is what runs already\"")
