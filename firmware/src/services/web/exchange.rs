@@ -142,7 +142,13 @@ impl<S: Read + Write> Exchange<'_, S> {
 
     /// Answers with JSON.
     pub async fn json(&mut self, status: Status, value: &impl Serialize) -> Result<(), Trouble> {
-        let Ok(length) = serde_json_core::to_slice(value, self.room.as_mut_slice()) else {
+        let length = serde_json_core::to_slice(value, self.room.as_mut_slice()).ok();
+        self.send(status, length).await
+    }
+
+    /// Answers with the JSON in the room: one sender for everything that is told.
+    async fn send(&mut self, status: Status, length: Option<usize>) -> Result<(), Trouble> {
+        let Some(length) = length else {
             // What is told about the machine fits; this would be a mistake of its own.
             return self.head(Status::SERVER_ERROR, Answer::default()).await;
         };
