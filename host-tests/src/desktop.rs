@@ -4,10 +4,12 @@
 //! all of 127.0.0.0/8), so that tests run side by side.
 
 mod client;
+mod motion;
 mod process;
 pub mod serial;
 mod web;
 
 pub use client::{Client, TERMINATOR};
+pub use motion::Motion;
 pub use process::{Desktop, PORT, Run, binary, draw, target_folder, wait_until};
 pub use web::{Answer, Web, WebSocket};

@@ -118,9 +118,11 @@ impl House {
         job || self.drawer.is_drawing() || self.drawings.is_recording()
     }
 
-    /// A little wave, if the arm is to make any and has nothing else to do; says whether it makes one.
+    /// A little wave, if the arm is to make any and has nothing else to do, not even between two lines of a drawing;
+    /// says whether it makes one.
     fn wave(&self) -> bool {
-        self.settings(|settings| settings.waves) && self.arm.wave()
+        let wanted = self.settings(|settings| settings.waves);
+        wanted && !self.has_drawing_under_way() && self.arm.wave()
     }
 
     /// Waves before the first client after power-on is greeted, and is home again.

@@ -1,33 +1,10 @@
 //! Drawings that the machine holds.
 
 use super::arm;
-use host_tests::desktop::{Desktop, Web, draw, wait_until};
+use host_tests::desktop::{Desktop, Motion, Web, wait_until};
 use serde_json::json;
 use std::fmt::Write;
 use std::fs;
-use std::path::Path;
-
-/// Pulses of a trace, rests left out: what the servos did.
-fn motion(trace: &Path) -> Vec<String> {
-    let text = fs::read_to_string(trace).unwrap();
-    let mut motion: Vec<String> = text
-        .lines()
-        .skip(1)
-        .map(|row| row.split(',').skip(4).take(3).collect::<Vec<_>>().join(","))
-        .collect();
-    motion.dedup();
-    motion
-}
-
-/// What the servos do when a client sends these lines.
-fn motion_of_a_client(text: &str) -> Vec<String> {
-    let folder = tempfile::tempdir().unwrap();
-    let (file, trace) = (folder.path().join("a.gcode"), folder.path().join("a.csv"));
-    fs::write(&file, text).unwrap();
-    let run = draw(&file, &["--trace", &trace.to_string_lossy()]);
-    assert_eq!(run.status, 0, "{}", run.stderr);
-    motion(&trace)
-}
 
 /// Zigzags with the pen down, larger than what the machine holds.
 fn long_drawing() -> String {
@@ -73,7 +50,7 @@ fn the_machine_draws_by_itself_what_a_client_would() {
     assert_eq!(job["seconds"]["left"], 0);
     assert_eq!(web.get("/api/job/drawing").body, text.as_bytes());
     arm.stop();
-    assert_eq!(motion(&trace), motion_of_a_client(&text));
+    Motion::of(&trace).assert_is(&Motion::of_a_client(&text));
 }
 
 #[test]
@@ -145,7 +122,7 @@ fn a_drawing_pauses_between_two_lines_and_goes_back_when_it_goes_on() {
         "G01 Z1000\nG01 X1500\n",
         "G01 Z1000\nG01 X1000 Y1000\nG01 X1200 Y-400\nG01 X1500\n",
     );
-    assert_eq!(motion(&trace), motion_of_a_client(&interrupted));
+    Motion::of(&trace).assert_is(&Motion::of_a_client(&interrupted));
 }
 
 #[test]
@@ -240,7 +217,7 @@ fn a_drawing_larger_than_the_machine_holds_comes_in_pieces() {
     );
     assert_eq!(web.get("/api/job/drawing").status, 404);
     arm.stop();
-    assert_eq!(motion(&trace), motion_of_a_client(&text));
+    Motion::of(&trace).assert_is(&Motion::of_a_client(&text));
 }
 
 #[test]
@@ -264,7 +241,7 @@ fn the_pen_waits_in_the_air_for_the_next_piece() {
     wait_for(web, "done");
     arm.stop();
     let expected = format!("{first}G01 Z1000\nG01 Z0\nG01 X1400\nG01 Z1000\n");
-    assert_eq!(motion(&trace), motion_of_a_client(&expected));
+    Motion::of(&trace).assert_is(&Motion::of_a_client(&expected));
 }
 
 #[test]

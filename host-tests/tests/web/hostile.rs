@@ -2,10 +2,8 @@
 //! they were not there.
 
 use super::arm;
-use host_tests::desktop::{Desktop, draw, wait_until};
-use std::fs;
+use host_tests::desktop::{Desktop, Motion, wait_until};
 use std::io::{Read, Write};
-use std::path::Path;
 
 /// The status of an answer, 0 where the connection was closed without one.
 fn status(answer: &[u8]) -> u16 {
@@ -153,18 +151,6 @@ fn frames_that_are_wrong_end_the_connection_with_the_reason() {
     }
 }
 
-/// Pulses of a trace, rests left out.
-fn motion(trace: &Path) -> Vec<String> {
-    let text = fs::read_to_string(trace).unwrap();
-    let mut motion: Vec<String> = text
-        .lines()
-        .skip(1)
-        .map(|row| row.split(',').skip(4).take(3).collect::<Vec<_>>().join(","))
-        .collect();
-    motion.dedup();
-    motion
-}
-
 #[test]
 fn a_crowd_does_not_disturb_a_drawing() {
     let folder = tempfile::tempdir().unwrap();
@@ -186,8 +172,5 @@ fn a_crowd_does_not_disturb_a_drawing() {
     assert!(grown < 10_000, "{grown} kB more than before");
     arm.stop();
 
-    let (file, alone) = (folder.path().join("a.gcode"), folder.path().join("a.csv"));
-    fs::write(&file, &text).unwrap();
-    draw(&file, &["--trace", &alone.to_string_lossy()]);
-    assert_eq!(motion(&trace), motion(&alone));
+    Motion::of(&trace).assert_is(&Motion::of_a_client(&text));
 }
