@@ -10,6 +10,9 @@ pub mod light;
 pub mod power;
 pub mod quiet;
 pub mod radio;
+pub mod release;
+pub mod server;
+pub mod slots;
 pub mod tasks;
 pub mod tcp;
 pub mod wire;
@@ -21,18 +24,24 @@ use firmware::boards::desktop::clock::HandTime;
 use firmware::boards::scripted_radio::{Air, Pace};
 use firmware::services::House;
 use flash::Cells;
+use journal::note;
 use light::LightRecord;
 use power::Power;
 use protocol_core::settings::Settings;
+use protocol_core::update::Slot;
 use protocol_core::wifi::Ssid;
 use radio::RadioRecord;
-use std::cell::RefCell;
+use release::Release;
+use server::Server;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use tasks::Tasks;
 use tcp::Port;
 
 /// Time between two set-points of the servos, as on desktop and virt.
 pub const FRAME: Duration = Duration::from_millis(10);
+/// The watchdog restarts a firmware that hangs for so long, as on the chips.
+pub const WATCHDOG: Duration = Duration::from_secs(5);
 /// More polls than this without time going on, and the firmware runs in circles.
 const POLLS_AT_MOST: usize = 200_000;
 
@@ -54,6 +63,20 @@ pub struct Board {
     pub cells: Rc<RefCell<Cells>>,
     /// Where clients connect.
     pub port: Rc<Port>,
+    /// Where updates come from; it is reached from a network that the machine has joined.
+    pub server: Server,
+    /// There are two places for firmware, else one.
+    pub two_slots: bool,
+    /// Starts that the firmware or the watchdog has asked for, for the script to take out.
+    pub restarts: u32,
+    /// What has been built: what it is called, and its image.
+    built: Vec<(String, Vec<u8>)>,
+    /// The firmware that runs.
+    running: Option<String>,
+    /// The firmware has asked for a start.
+    restart: Rc<Cell<bool>>,
+    /// It hangs, and will be restarted then.
+    hangs_until: Option<Instant>,
     house: Rc<RefCell<Option<Rc<House>>>>,
     tasks: Tasks,
     /// The last to go.
@@ -70,10 +93,22 @@ impl Board {
 
     /// A new machine in its box: nothing stored, no power. Time begins at 0, and belongs to this thread.
     pub fn new() -> Self {
+        let air = Rc::new(Air::new(Pace::LIFELIKE));
+        let radio = Rc::new(RadioRecord::default());
+        let server = Server::default();
+        let (way, joined) = (air.clone(), radio.clone());
+        server.behind(move || joined.leads_on(&way));
         Self {
             power: Power::default(),
-            air: Rc::new(Air::new(Pace::LIFELIKE)),
-            radio: Rc::default(),
+            air,
+            radio,
+            server,
+            two_slots: true,
+            restarts: 0,
+            built: vec![("the old firmware".into(), slots::OLD.into())],
+            running: None,
+            restart: Rc::default(),
+            hangs_until: None,
             light: Rc::default(),
             arm: Rc::default(),
             button: Rc::default(),
@@ -89,7 +124,7 @@ impl Board {
     pub fn power_on(&mut self, reason: &'static str) {
         self.cut_the_power();
         self.power.switch(true);
-        firmware_tasks::start(self, reason);
+        self.boot(reason);
     }
 
     /// Power goes, in the middle of whatever the firmware does.
@@ -97,20 +132,77 @@ impl Board {
         if self.power.is_on() {
             self.power.switch(false);
         }
+        self.stop();
+        self.cells.borrow_mut().stop_failing();
+    }
+
+    /// The firmware or the watchdog has the machine start again; power stays.
+    fn start_again(&mut self, reason: &'static str) {
+        note(format_args!("    the machine starts again: {reason}"));
+        self.restarts += 1;
+        // What ends does so as without power: nothing is sent any more.
+        let power = self.power.clone();
+        power.interrupt(|| self.stop());
+        self.boot(reason);
+    }
+
+    /// The bootloader: starts the firmware that is chosen.
+    fn boot(&mut self, reason: &'static str) {
+        let choice = slots::choice(self.at_rest(), flash::SIZE as usize);
+        let slot = choice.slot();
+        self.running = self.firmware_in(slot);
+        if self.running.is_none() {
+            self.power
+                .offend("what the bootloader starts is no whole firmware");
+        }
+        firmware_tasks::start(self, reason, slot);
+    }
+
+    /// What a slot holds, if that is a whole firmware.
+    fn firmware_in(&self, slot: Slot) -> Option<String> {
+        let cells = self.cells.borrow();
+        let content = slots::content(cells.firmware(), slot);
+        let built = self.built.iter().rev();
+        let mut whole = built.filter(|(_, image)| content.starts_with(image));
+        whole.next().map(|(name, _)| name.clone())
+    }
+
+    /// The firmware that runs.
+    pub fn running(&self) -> Option<&str> {
+        let running = self.running.as_deref();
+        running.filter(|_| self.power.is_on())
+    }
+
+    /// A release on the server, from now on.
+    pub fn offer(&mut self, release: &Release) {
+        let built = (release.version.clone(), release.image.clone());
+        self.built.push(built);
+        release.put_on(&self.server);
+    }
+
+    /// The firmware does nothing any more, until the watchdog bites.
+    pub fn hang(&mut self) {
+        note("    the firmware hangs");
+        self.hangs_until = Some(Instant::now() + WATCHDOG);
+    }
+
+    /// Nothing runs any more.
+    fn stop(&mut self) {
         self.tasks = Tasks::default();
         self.time.forget_alarms();
         self.house.take();
         self.port.power_off();
         self.arm.power_off();
         self.light.show(Default::default());
-        self.cells.borrow_mut().stop_failing();
         self.radio.asked.set(false);
+        self.restart.set(false);
+        self.hangs_until = None;
     }
 
     /// Lets the firmware do all that it does without time going on; says whether that was anything.
     pub fn settle(&mut self) -> bool {
         let mut polls = 0;
-        while self.power.is_on() && (self.tasks.poll_one() || self.tasks_wait_for_now()) {
+        while self.power.is_on() && self.go_on() {
             polls += 1;
             if polls > POLLS_AT_MOST {
                 self.power
@@ -125,6 +217,22 @@ impl Board {
         polls > 0
     }
 
+    /// One step of whatever runs, if there is any without time going on.
+    fn go_on(&mut self) -> bool {
+        if self.restart.take() {
+            self.start_again("firmware");
+            return true;
+        }
+        match self.hangs_until {
+            Some(until) if Instant::now() < until => false,
+            Some(_) => {
+                self.start_again("watchdog");
+                true
+            }
+            None => self.tasks.poll_one() || self.tasks_wait_for_now(),
+        }
+    }
+
     /// Rings alarms that are due already, and says whether some were.
     fn tasks_wait_for_now(&mut self) -> bool {
         self.time.next_alarm();
@@ -133,7 +241,10 @@ impl Board {
 
     /// Lets time go on to the next alarm, at most to `deadline`.
     pub fn step(&mut self, deadline: Instant) {
-        let next = self.time.next_alarm().unwrap_or(deadline);
+        let next = match self.hangs_until {
+            Some(until) => until,
+            None => self.time.next_alarm().unwrap_or(deadline),
+        };
         self.time.go_on_to(next.min(deadline));
     }
 
@@ -150,6 +261,11 @@ impl Board {
         house
             .as_ref()
             .is_some_and(|house| house.arm.with(|arm| arm.is_busy()))
+    }
+
+    /// The memory, without the machine.
+    fn at_rest(&self) -> flash::Flash {
+        firmware_tasks::flash_at_rest(&self.cells)
     }
 
     /// Has the machine remember something, as if it had been told before.
@@ -172,7 +288,34 @@ impl Default for Board {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use embassy_futures::yield_now;
+    use embassy_futures::{block_on, yield_now};
+    use embedded_storage_async::nor_flash::NorFlash;
+
+    #[test]
+    fn half_a_firmware_is_told() {
+        let mut board = Board::new();
+        board.power_on("a test");
+        assert_eq!(board.running(), Some("the old firmware"));
+        let first = flash::SIZE + slots::start_of(Slot::First) as u32;
+        block_on(board.at_rest().erase(first, first + 4096)).unwrap();
+        board.power_on("a test");
+        let offence = board.power.offence().unwrap();
+        assert!(offence.contains("no whole firmware"), "{offence}");
+    }
+
+    #[test]
+    fn the_watchdog_bites_after_five_seconds_and_no_alarm_before() {
+        let mut board = Board::new();
+        board.power_on("a test");
+        board.settle();
+        board.hang();
+        for (at, restarts) in [(1, 0), (4, 0), (5, 1)] {
+            board.step(Instant::from_secs(at));
+            board.settle();
+            assert_eq!(board.restarts, restarts, "{at}");
+        }
+        assert_eq!(board.power.offence(), None);
+    }
 
     #[test]
     fn a_firmware_that_runs_in_circles_is_told() {

@@ -9,7 +9,5 @@ mod cuts;
 mod dice;
 mod machine;
 mod refusals;
-mod release;
-mod server;
 mod success;
 mod trial;
