@@ -1,8 +1,11 @@
 //! What a line of a scenario says.
 
+use super::server::ServerAction;
+use crate::scripted::flash::Wear;
 use crate::scripted::light::{Hue, Pattern};
 use embassy_time::Duration;
 use protocol_core::settings::{AccessPointName, MachineName, StartMode};
+use protocol_core::update::ManifestAddress;
 use protocol_core::wifi::{self, Password, Ssid};
 
 /// What a line says.
@@ -35,6 +38,11 @@ pub enum Action {
     JoinTakes(Duration),
     ComputerLeaves,
     Client(char, ClientAction),
+    Server(ServerAction),
+    /// There is no second place for firmware.
+    OneSlot,
+    /// The firmware hangs, until the watchdog bites.
+    Hang,
     Wait(Duration),
 }
 
@@ -51,6 +59,8 @@ pub enum Kept {
     AccessPoint(AccessPointName),
     /// M291.
     Waves(bool),
+    /// M997 S.
+    UpdateAddress(ManifestAddress),
 }
 
 /// What becomes of the memory.
@@ -58,8 +68,7 @@ pub enum Kept {
 pub enum Memory {
     Empty,
     Garbage,
-    WornOut,
-    Well,
+    Wear(Wear),
 }
 
 /// What changes about a network; what is not said stays as it was.
@@ -99,6 +108,11 @@ pub enum Expectation {
     IsFound(Option<String>),
     Remembers(Remembered),
     PowerIsOff,
+    StartsAgain,
+    /// As often as it likes, until a line expects it or power comes.
+    MayStartAgain,
+    /// The firmware of one of these names.
+    Runs(Vec<String>),
     ArmWaves,
     ArmRests(Option<[i32; 3]>),
     ArmStays(Duration),

@@ -5,6 +5,7 @@ mod client;
 mod command;
 mod expect;
 mod parse;
+mod server;
 mod stage;
 mod words;
 
@@ -142,13 +143,13 @@ fn play_once(name: &str, text: &str) -> Result<(), Box<Failure>> {
             }
         };
         outcome.map_err(|instead| failure(*number, line, instead))?;
-        expect::forgive_tries(&mut stage);
+        expect::forgive(&mut stage);
     }
     let last = commands.last().map_or(1, |(number, ..)| *number);
     note("the scenario's end");
     let ended = stage.wait(ENCORE);
     ended.map_err(|offence| failure(last, "nothing after the end", offence))?;
-    expect::forgive_tries(&mut stage);
+    expect::forgive(&mut stage);
     match stage.left_over() {
         Some(left_over) => Err(failure(last, "nothing that no line expected", left_over)),
         None => Ok(()),

@@ -4,10 +4,13 @@ use super::command::{
     Action, ClientAction, ClientExpectation, Command, Expectation, Kept, Memory, Network, Outcome,
     Remembered,
 };
+use super::server;
 use super::words::Words;
+use crate::scripted::flash::Wear;
 use crate::scripted::light::{Hue, Pattern};
 use embassy_time::Duration;
 use protocol_core::settings::{AccessPointName, MachineName, StartMode};
+use protocol_core::update::ManifestAddress;
 use protocol_core::wifi::{self, Password, Ssid};
 
 /// Reads a line that is no comment.
@@ -74,6 +77,14 @@ fn action(words: &mut Words<'_>) -> Found<Action> {
         Action::JoinTakes(words.time()?)
     } else if words.eat("computer leaves") {
         Action::ComputerLeaves
+    } else if words.eat("server") {
+        Action::Server(server::parse(words)?)
+    } else if words.eat("server's") {
+        Action::Server(server::parse_file(words)?)
+    } else if words.eat("board has no place for another firmware") {
+        Action::OneSlot
+    } else if words.eat("firmware hangs") {
+        Action::Hang
     } else if words.eat("wait") {
         Action::Wait(words.time()?)
     } else {
@@ -86,8 +97,9 @@ fn memory(words: &mut Words<'_>) -> Result<Memory, String> {
     for (name, memory) in [
         ("empty", Memory::Empty),
         ("garbage", Memory::Garbage),
-        ("worn out", Memory::WornOut),
-        ("well", Memory::Well),
+        ("worn out silently", Memory::Wear(Wear::Silent)),
+        ("worn out", Memory::Wear(Wear::WornOut)),
+        ("well", Memory::Wear(Wear::Well)),
     ] {
         if words.eat(name) {
             return Ok(memory);
@@ -112,9 +124,13 @@ fn kept(words: &mut Words<'_>) -> Result<Kept, String> {
         Kept::AccessPoint(name.ok_or("1 is Line-us-Setup, 2 the machine's name")?)
     } else if words.eat("no waves") {
         Kept::Waves(false)
+    } else if words.eat("update address") {
+        let address = words.text()?;
+        let address = ManifestAddress::new(&String::from_utf8_lossy(&address));
+        Kept::UpdateAddress(address.ok_or("an address is http://HOST[:PORT]/PATH")?)
     } else {
         return Err(
-            "the memory holds a network, a name, a start mode, an access point name or no waves"
+            "the memory holds a network, a name, a start mode, an access point name, an update address or no waves"
                 .into(),
         );
     })
@@ -253,10 +269,17 @@ fn machine(words: &mut Words<'_>) -> Result<Expectation, String> {
         Expectation::Tries(ssid(words)?, Outcome::Refused)
     } else if words.eat("fails to join") {
         Expectation::Tries(ssid(words)?, Outcome::Failed)
+    } else if words.eat("may start again") {
+        Expectation::MayStartAgain
     } else if words.eat("may try") {
         Expectation::MayTry(ssid(words)?)
     } else if words.eat("tries nothing") {
         Expectation::TriesNothing(stay(words)?)
+    } else if words.eat("starts again") {
+        Expectation::StartsAgain
+    } else if words.eat("runs") {
+        let names = words.take_rest().split(" or ");
+        Expectation::Runs(names.map(str::to_owned).collect())
     } else if words.eat("remembers") {
         Expectation::Remembers(remembered(words)?)
     } else {

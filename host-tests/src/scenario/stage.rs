@@ -2,6 +2,7 @@
 
 use super::client::Client;
 use super::command::{Action, ClientAction, Kept, Memory, Network};
+use super::server;
 use crate::scripted::Board;
 use crate::scripted::journal::note;
 use crate::scripted::light::{Hue, Pattern};
@@ -36,10 +37,12 @@ pub struct Stage {
     seen: Pattern,
     /// The last pattern of the light that was expected, since power came.
     pub looked: Option<Pattern>,
-    /// When power came last.
+    /// When power came last, or the machine was seen to start again.
     pub powered: Instant,
     /// Attempts to join it need not be expected one by one.
     pub tries_allowed: Option<Ssid>,
+    /// Starts need not be expected one by one.
+    pub starts_allowed: bool,
     /// How much the arm had done when the script did something last.
     pub acted: usize,
     /// How far the nib's way has been followed.
@@ -58,6 +61,7 @@ impl Stage {
             looked: None,
             powered: Instant::MIN,
             tries_allowed: None,
+            starts_allowed: false,
             acted: 0,
             passed: 0,
         }
@@ -144,11 +148,7 @@ impl Stage {
             Action::PowerOn { held } => {
                 self.board.button.set(*held);
                 self.board.power_on("power on");
-                self.powered = Instant::now();
-                self.acted = self.board.arm.length();
-                self.passed = self.acted;
-                self.looked = None;
-                self.tries_allowed = None;
+                self.begin();
             }
             Action::CutThePower => {
                 self.board.cut_the_power();
@@ -164,14 +164,14 @@ impl Stage {
                 Kept::Start(mode) => settings.start = *mode,
                 Kept::AccessPoint(name) => settings.access_point = *name,
                 Kept::Waves(on) => settings.waves = *on,
+                Kept::UpdateAddress(address) => settings.update_address = Some(address.clone()),
             }),
             Action::Memory(memory) => {
                 let mut cells = self.board.cells.borrow_mut();
                 match memory {
-                    Memory::Empty => *cells = Default::default(),
+                    Memory::Empty => cells.erase(),
                     Memory::Garbage => cells.fill_with_garbage(),
-                    Memory::WornOut => cells.wear_out(true),
-                    Memory::Well => cells.wear_out(false),
+                    Memory::Wear(wear) => cells.wear(*wear),
                 }
             }
             Action::Press => {
@@ -205,9 +205,22 @@ impl Stage {
             }
             Action::ComputerLeaves => self.computer = None,
             Action::Client(name, action) => self.client_acts(*name, action)?,
+            Action::Server(action) => server::act(&mut self.board, action),
+            Action::OneSlot => self.board.two_slots = false,
+            Action::Hang => self.board.hang(),
             Action::Wait(time) => self.wait(*time)?,
         }
         self.wait(Duration::MIN)
+    }
+
+    /// The machine has just started: what was seen of it before is over.
+    pub fn begin(&mut self) {
+        self.powered = Instant::now();
+        self.acted = self.board.arm.length();
+        self.passed = self.acted;
+        self.looked = None;
+        self.tries_allowed = None;
+        self.starts_allowed = false;
     }
 
     fn client_acts(&mut self, name: char, action: &ClientAction) -> Result<(), String> {
@@ -268,6 +281,9 @@ impl Stage {
         let mut clients = self.clients.iter();
         if let Some(left_over) = clients.find_map(Client::left_over) {
             return Some(left_over);
+        }
+        if self.board.restarts > 0 {
+            return Some("the machine starts again".into());
         }
         let opened = self.board.radio.opened.borrow();
         if let Some(own) = opened.front() {

@@ -83,6 +83,11 @@ impl<'a> Words<'a> {
         self.0
     }
 
+    /// Takes off all that is left.
+    pub fn take_rest(&mut self) -> &'a str {
+        std::mem::take(&mut self.0)
+    }
+
     /// Nothing may be left.
     pub fn end(mut self) -> Result<(), String> {
         self.skip_commas();

@@ -7,6 +7,7 @@ use super::light::Light;
 use super::power::Power;
 use super::quiet::Quiet;
 use super::radio::{RadioRecord, RecordedAddress, RecordedRadio};
+use super::slots::{Part, Slots};
 use super::tcp::Acceptor;
 use super::{Board, FRAME};
 use firmware::board::Vitals;
@@ -17,10 +18,11 @@ use firmware::services::discovery::{self, Ports};
 use firmware::services::drawings::Album;
 use firmware::services::line_us::{PORT, Server};
 use firmware::services::storage::Memory;
-use firmware::services::{drawer, network, panel};
+use firmware::services::{drawer, network, panel, update};
 use protocol_core::lineus::Identity;
 use protocol_core::machine::{ArmData, Client};
 use protocol_core::settings::Settings;
+use protocol_core::update::Slot;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -37,8 +39,8 @@ fn album(flash: Flash) -> Album<Flash> {
     Album::new(flash, SETTINGS..SIZE).expect("whole pages")
 }
 
-/// Starts everything, as the programs of the other boards do.
-pub fn start(board: &Board, reason: &'static str) {
+/// Starts everything, as the programs of the other boards do, with the firmware of this slot.
+pub fn start(board: &Board, reason: &'static str, running: Slot) {
     let place = board.house.clone();
     let moves = |house: &Rc<House>| house.arm.with(|arm| arm.next_event().is_some());
     let moving = move || place.borrow().as_ref().is_some_and(moves);
@@ -49,10 +51,18 @@ pub fn start(board: &Board, reason: &'static str) {
         moving: moving.clone(),
     };
     let (mut memory, mut album) = (memory(flash()), album(flash()));
+    let (restart, power) = (board.restart.clone(), board.power.clone());
+    let restart: Rc<dyn Fn()> = Rc::new(move || restart.set(power.is_on()));
+    let slots = Slots::new(&flash(), SIZE as usize, running, restart.clone());
+    let mut choice = Part::choice(flash(), SIZE as usize);
+    let (web, two_slots) = (board.server.clone(), board.two_slots);
     let devices = Devices::of(board);
     let spawner = board.tasks.spawner();
     let place = board.house.clone();
     board.tasks.spawner().spawn(async move {
+        let Some(standing) = update::at_start(&mut choice, running).await else {
+            return restart();
+        };
         let (settings, _) = memory.load().await;
         album.open().await;
         let vitals = Vitals {
@@ -95,6 +105,10 @@ pub fn start(board: &Board, reason: &'static str) {
         spawner.spawn(async move { server.turn_away(&*acceptor).await });
         let served = house.clone();
         spawner.spawn(async move { served.drawings.run(album).await });
+        if two_slots {
+            let served = house.clone();
+            spawner.spawn(async move { update::run(&served, web, slots, standing).await });
+        }
         spawner.spawn(async move { drawer::run(&house).await });
     });
 }
@@ -155,9 +169,14 @@ pub fn remember(cells: &Rc<RefCell<Cells>>, change: impl FnOnce(&mut Settings)) 
 
 /// The memory in these cells, without the machine.
 fn at_rest(cells: &Rc<RefCell<Cells>>) -> Memory<Flash> {
-    memory(Flash {
+    memory(flash_at_rest(cells))
+}
+
+/// These cells, without the machine.
+pub fn flash_at_rest(cells: &Rc<RefCell<Cells>>) -> Flash {
+    Flash {
         cells: cells.clone(),
         power: Power::present(),
         moving: Rc::new(|| false),
-    })
+    }
 }

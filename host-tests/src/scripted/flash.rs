@@ -3,6 +3,7 @@
 
 use super::journal::note;
 use super::power::Power;
+use super::slots;
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
@@ -14,40 +15,67 @@ use std::rc::Rc;
 pub const SETTINGS: u32 = 8 * 4096;
 /// Bytes for settings and then drawings, as many as the boards have for those.
 pub const SIZE: u32 = SETTINGS + 360 * 4096;
+/// Bytes for settings, drawings, and then firmware and the choice of it.
+const WHOLE: u32 = SIZE + slots::SIZE as u32;
+
+/// How the memory answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wear {
+    /// It does what it says.
+    #[default]
+    Well,
+    /// It takes nothing any more.
+    WornOut,
+    /// It takes nothing any more, and says it does.
+    Silent,
+}
 
 /// The cells, with or without power.
 #[derive(Clone, Debug)]
 pub struct Cells {
     bytes: Vec<u8>,
-    /// It takes nothing any more.
-    worn: bool,
+    wear: Wear,
     /// The power fails when this many bytes more are written.
     fails_after: Option<u32>,
 }
 
 impl Default for Cells {
     fn default() -> Self {
+        let mut bytes = vec![0xff; SIZE as usize];
+        bytes.extend(slots::of_a_new_machine());
         Self {
-            bytes: vec![0xff; SIZE as usize],
-            worn: false,
+            bytes,
+            wear: Wear::Well,
             fails_after: None,
         }
     }
 }
 
 impl Cells {
-    /// Noise, the same each time.
+    /// What is there for firmware and the choice of it.
+    pub fn firmware(&self) -> &[u8] {
+        &self.bytes[SIZE as usize..]
+    }
+
+    /// No settings and no drawings.
+    pub fn erase(&mut self) {
+        self.bytes[..SIZE as usize].fill(0xff);
+        self.wear = Wear::Well;
+        self.fails_after = None;
+    }
+
+    /// Noise instead of settings and drawings, the same each time.
     pub fn fill_with_garbage(&mut self) {
         let mut noise: u32 = 1;
-        for byte in &mut self.bytes {
+        for byte in &mut self.bytes[..SIZE as usize] {
             noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             *byte = (noise >> 24) as u8;
         }
     }
 
-    /// From now on it refuses to be written and erased, or takes it again.
-    pub const fn wear_out(&mut self, worn: bool) {
-        self.worn = worn;
+    /// How it answers from now on.
+    pub const fn wear(&mut self, wear: Wear) {
+        self.wear = wear;
     }
 
     /// The power fails with the next byte but `bytes`; an erase counts as one.
@@ -84,6 +112,7 @@ impl NorFlashError for Refused {
 }
 
 /// The flash of the board.
+#[derive(Clone)]
 pub struct Flash {
     /// What it holds.
     pub cells: Rc<RefCell<Cells>>,
@@ -94,8 +123,8 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// Looks whether it may be changed.
-    async fn begin(&mut self) -> Result<(), Refused> {
+    /// Looks whether it may be changed, and says whether it will be.
+    async fn begin(&mut self) -> Result<bool, Refused> {
         if !self.power.is_on() {
             pending::<()>().await;
         }
@@ -103,11 +132,15 @@ impl Flash {
             self.power
                 .offend("the memory is written while a move is under way");
         }
-        if self.cells.borrow().worn {
-            note("    memory: refuses");
-            return Err(Refused(NorFlashErrorKind::Other));
+        let wear = self.cells.borrow().wear;
+        match wear {
+            Wear::Well => Ok(true),
+            Wear::Silent => Ok(false),
+            Wear::WornOut => {
+                note("    memory: refuses");
+                Err(Refused(NorFlashErrorKind::Other))
+            }
         }
-        Ok(())
     }
 
     /// The power fails: nothing comes after this.
@@ -126,7 +159,7 @@ fn check(begin: u32, length: u32, unit: u32) -> Result<(), Refused> {
         return Err(Refused(NorFlashErrorKind::NotAligned));
     }
     match begin.checked_add(length) {
-        Some(..=SIZE) => Ok(()),
+        Some(..=WHOLE) => Ok(()),
         _ => Err(Refused(NorFlashErrorKind::OutOfBounds)),
     }
 }
@@ -146,7 +179,7 @@ impl ReadNorFlash for Flash {
     }
 
     fn capacity(&self) -> usize {
-        SIZE as usize
+        WHOLE as usize
     }
 }
 
@@ -158,7 +191,9 @@ impl NorFlash for Flash {
         let length = to.checked_sub(from);
         let length = length.ok_or(Refused(NorFlashErrorKind::OutOfBounds))?;
         check(from, length, Self::ERASE_SIZE as u32)?;
-        self.begin().await?;
+        if !self.begin().await? {
+            return Ok(());
+        }
         for page in (from..to).step_by(Self::ERASE_SIZE) {
             // An erase that is cut short leaves the end of its page as it was.
             let fails = self.cells.borrow_mut().fails_now();
@@ -174,7 +209,9 @@ impl NorFlash for Flash {
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refused> {
         check(offset, bytes.len() as u32, Self::WRITE_SIZE as u32)?;
-        self.begin().await?;
+        if !self.begin().await? {
+            return Ok(());
+        }
         for (at, byte) in (offset..).zip(bytes) {
             if self.cells.borrow_mut().fails_now() {
                 self.fail(at).await;
@@ -221,11 +258,11 @@ mod tests {
         for refused in [
             block_on(flash.write(2, &[0; 4])),
             block_on(flash.write(0, &[0; 3])),
-            block_on(flash.write(SIZE, &[0; 4])),
+            block_on(flash.write(WHOLE, &[0; 4])),
             block_on(flash.erase(0, 4)),
             block_on(flash.erase(4096, 0)),
-            block_on(flash.erase(0, SIZE + 4096)),
-            block_on(flash.read(SIZE - 1, &mut [0; 2])),
+            block_on(flash.erase(0, WHOLE + 4096)),
+            block_on(flash.read(WHOLE - 1, &mut [0; 2])),
         ] {
             assert!(refused.is_err());
         }
@@ -265,7 +302,10 @@ mod tests {
     #[test]
     fn worn_out_it_is_read_only() {
         let mut flash = flash(false);
-        flash.cells.borrow_mut().wear_out(true);
+        flash.cells.borrow_mut().wear(Wear::Silent);
+        block_on(flash.write(0, &[0; 4])).unwrap();
+        assert_eq!(first(&flash), [0xff; 4]);
+        flash.cells.borrow_mut().wear(Wear::WornOut);
         assert!(block_on(flash.write(0, &[0; 4])).is_err());
         assert!(block_on(flash.erase(0, 4096)).is_err());
         assert!(block_on(flash.read(0, &mut [0; 4])).is_ok());

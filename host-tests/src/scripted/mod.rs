@@ -2,6 +2,7 @@
 //! time, in one thread. Power comes and goes; the flash, the air and the clients stay.
 
 pub mod arm;
+mod boot;
 pub mod button;
 mod firmware_tasks;
 pub mod flash;
@@ -10,6 +11,9 @@ pub mod light;
 pub mod power;
 pub mod quiet;
 pub mod radio;
+pub mod release;
+pub mod server;
+pub mod slots;
 pub mod tasks;
 pub mod tcp;
 pub mod wire;
@@ -26,7 +30,8 @@ use power::Power;
 use protocol_core::settings::Settings;
 use protocol_core::wifi::Ssid;
 use radio::RadioRecord;
-use std::cell::RefCell;
+use server::Server;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use tasks::Tasks;
 use tcp::Port;
@@ -54,6 +59,20 @@ pub struct Board {
     pub cells: Rc<RefCell<Cells>>,
     /// Where clients connect.
     pub port: Rc<Port>,
+    /// Where updates come from; it is reached from a network that the machine has joined.
+    pub server: Server,
+    /// There are two places for firmware, else one.
+    pub two_slots: bool,
+    /// Starts that the firmware or the watchdog has asked for, for the script to take out.
+    pub restarts: u32,
+    /// What has been built: what it is called, and its image.
+    built: Vec<(String, Vec<u8>)>,
+    /// The firmware that runs.
+    running: Option<String>,
+    /// The firmware has asked for a start.
+    restart: Rc<Cell<bool>>,
+    /// It hangs, and will be restarted then.
+    hangs_until: Option<Instant>,
     house: Rc<RefCell<Option<Rc<House>>>>,
     tasks: Tasks,
     /// The last to go.
@@ -70,10 +89,22 @@ impl Board {
 
     /// A new machine in its box: nothing stored, no power. Time begins at 0, and belongs to this thread.
     pub fn new() -> Self {
+        let air = Rc::new(Air::new(Pace::LIFELIKE));
+        let radio = Rc::new(RadioRecord::default());
+        let server = Server::default();
+        let (way, joined) = (air.clone(), radio.clone());
+        server.behind(move || joined.leads_on(&way));
         Self {
             power: Power::default(),
-            air: Rc::new(Air::new(Pace::LIFELIKE)),
-            radio: Rc::default(),
+            air,
+            radio,
+            server,
+            two_slots: true,
+            restarts: 0,
+            built: vec![("the old firmware".into(), slots::OLD.into())],
+            running: None,
+            restart: Rc::default(),
+            hangs_until: None,
             light: Rc::default(),
             arm: Rc::default(),
             button: Rc::default(),
@@ -89,7 +120,7 @@ impl Board {
     pub fn power_on(&mut self, reason: &'static str) {
         self.cut_the_power();
         self.power.switch(true);
-        firmware_tasks::start(self, reason);
+        self.boot(reason);
     }
 
     /// Power goes, in the middle of whatever the firmware does.
@@ -97,20 +128,27 @@ impl Board {
         if self.power.is_on() {
             self.power.switch(false);
         }
+        self.stop();
+        self.cells.borrow_mut().stop_failing();
+    }
+
+    /// Nothing runs any more.
+    fn stop(&mut self) {
         self.tasks = Tasks::default();
         self.time.forget_alarms();
         self.house.take();
         self.port.power_off();
         self.arm.power_off();
         self.light.show(Default::default());
-        self.cells.borrow_mut().stop_failing();
         self.radio.asked.set(false);
+        self.restart.set(false);
+        self.hangs_until = None;
     }
 
     /// Lets the firmware do all that it does without time going on; says whether that was anything.
     pub fn settle(&mut self) -> bool {
         let mut polls = 0;
-        while self.power.is_on() && (self.tasks.poll_one() || self.tasks_wait_for_now()) {
+        while self.power.is_on() && self.go_on() {
             polls += 1;
             if polls > POLLS_AT_MOST {
                 self.power
@@ -125,6 +163,22 @@ impl Board {
         polls > 0
     }
 
+    /// One step of whatever runs, if there is any without time going on.
+    fn go_on(&mut self) -> bool {
+        if self.restart.take() {
+            self.start_again("firmware");
+            return true;
+        }
+        match self.hangs_until {
+            Some(until) if Instant::now() < until => false,
+            Some(_) => {
+                self.start_again("watchdog");
+                true
+            }
+            None => self.tasks.poll_one() || self.tasks_wait_for_now(),
+        }
+    }
+
     /// Rings alarms that are due already, and says whether some were.
     fn tasks_wait_for_now(&mut self) -> bool {
         self.time.next_alarm();
@@ -133,7 +187,10 @@ impl Board {
 
     /// Lets time go on to the next alarm, at most to `deadline`.
     pub fn step(&mut self, deadline: Instant) {
-        let next = self.time.next_alarm().unwrap_or(deadline);
+        let next = match self.hangs_until {
+            Some(until) => until,
+            None => self.time.next_alarm().unwrap_or(deadline),
+        };
         self.time.go_on_to(next.min(deadline));
     }
 
@@ -150,6 +207,11 @@ impl Board {
         house
             .as_ref()
             .is_some_and(|house| house.arm.with(|arm| arm.is_busy()))
+    }
+
+    /// The memory, without the machine.
+    fn at_rest(&self) -> flash::Flash {
+        firmware_tasks::flash_at_rest(&self.cells)
     }
 
     /// Has the machine remember something, as if it had been told before.

@@ -37,6 +37,13 @@ impl Power {
         });
     }
 
+    /// Does what the end of a firmware does, as if there were no power.
+    pub fn interrupt(&self, end: impl FnOnce()) {
+        self.0.on.set(false);
+        end();
+        self.0.on.set(true);
+    }
+
     /// Something has happened that must never happen. The first such thing counts.
     pub fn offend(&self, what: impl Into<String>) {
         self.0

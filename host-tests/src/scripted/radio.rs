@@ -28,12 +28,16 @@ pub struct RadioRecord {
 }
 
 impl RadioRecord {
+    /// Whether the machine has an address in a network that it has joined, from where it goes on to others.
+    pub fn leads_on(&self, air: &Air) -> bool {
+        self.asked.get() && air.joined().is_some()
+    }
+
     /// The machine's address in this air.
     pub fn address(&self, air: &Air) -> Option<Ipv4Addr> {
-        let given = self.asked.get() && air.joined().is_some();
         match self.serving.get() {
             true => Some(OWN_ADDRESS),
-            false => given.then_some(Ipv4Addr::new(10, 0, 0, 2)),
+            false => self.leads_on(air).then_some(Ipv4Addr::new(10, 0, 0, 2)),
         }
     }
 }

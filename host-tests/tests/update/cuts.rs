@@ -2,9 +2,10 @@
 //! next is a whole firmware, and the right one.
 
 use crate::chip::Tear;
-use crate::machine::{Flash, Machine, OLD, WORLD, World, choice, flash, slot};
-use crate::release::{Release, address};
+use crate::machine::{Flash, Machine, WORLD, World, choice, flash, slot};
 use embassy_time::Duration;
+use host_tests::scripted::release::{Release, address};
+use host_tests::scripted::slots::OLD;
 use protocol_core::update::{Slot, Standing};
 
 /// More than a page, and not whole words.

@@ -1,15 +1,12 @@
-//! An arm with two small slots, in virtual time.
-//!
-//! Of eight pages, two are the boot choice, and three are each slot.
+//! An arm with two small slots on a chip that tears, in virtual time; only what an update needs, as it is
+//! started tens of thousands of times.
 
-use crate::chip::{Chip, ChipError};
-use crate::server::Server;
+use crate::chip::Chip;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_futures::block_on;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Instant, Timer};
-use embedded_storage_async::nor_flash::{ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash};
-use firmware::board::{FirmwareSlots, Servos, Vitals};
+use firmware::board::{Servos, Vitals};
 use firmware::boards::desktop::clock::HandTime;
 use firmware::boards::desktop::flash::{FileFlash, SIZE};
 use firmware::boards::desktop::{IDENTITY, NoAddress};
@@ -17,6 +14,8 @@ use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::services::arm::TimedFrames;
 use firmware::services::storage::Memory;
 use firmware::services::{House, network, update};
+use host_tests::scripted::server::Server;
+use host_tests::scripted::slots::{self, Part, Slots};
 use host_tests::scripted::tasks::Tasks;
 use protocol_core::machine::{ArmData, Client, Errand, Manner, SetPoint, Target};
 use protocol_core::motion::{Micros, Position};
@@ -26,11 +25,6 @@ use protocol_core::wifi::{Network, Password, Ssid};
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
-pub const BOARD: &str = "scripted";
-/// Bytes of a slot.
-pub const SLOT: usize = 3 * 4096;
-/// What runs.
-pub const OLD: &[u8] = b"the old firmware";
 /// The network that there is.
 const HOME: &[u8] = b"home";
 const FRAME: Duration = Duration::from_millis(10);
@@ -39,117 +33,16 @@ pub type Flash = Chip<4096>;
 
 /// A new machine's flash: old firmware in the first slot.
 pub fn flash() -> Flash {
-    let mut cells = vec![0xff; Flash::SIZE];
-    cells[2 * 4096..][..OLD.len()].copy_from_slice(OLD);
-    // As a bootloader leaves it at its first start.
-    cells[..4].copy_from_slice(&[1, 0, 0, 0]);
-    cells[24..32].copy_from_slice(&[2, 0, 0, 0, 154, 152, 67, 71]);
-    Flash::with(cells)
+    Flash::with(slots::of_a_new_machine())
 }
 
 /// What is in a slot.
 pub fn slot(flash: &Flash, slot: Slot) -> Vec<u8> {
-    let start = start_of(slot) as usize;
-    flash.state().cells[start..start + SLOT].to_vec()
+    slots::content(&flash.state().cells, slot).to_vec()
 }
 
 pub fn choice(flash: &Flash) -> BootChoice {
-    block_on(update::choice(&mut part(flash, 0, 2 * 4096))).expect("it has power")
-}
-
-fn start_of(slot: Slot) -> u32 {
-    match slot {
-        Slot::First => 2 * 4096,
-        Slot::Second => 5 * 4096,
-    }
-}
-
-/// Part of a chip.
-pub struct Part {
-    chip: Flash,
-    start: u32,
-    size: u32,
-}
-
-pub fn part(chip: &Flash, start: u32, size: u32) -> Part {
-    let chip = chip.clone();
-    Part { chip, start, size }
-}
-
-impl Part {
-    fn place(&self, at: u32, length: usize) -> Result<u32, ChipError> {
-        match at as usize + length <= self.size as usize {
-            true => Ok(self.start + at),
-            false => Err(ChipError::OutOfRange),
-        }
-    }
-}
-
-impl ErrorType for Part {
-    type Error = ChipError;
-}
-
-impl ReadNorFlash for Part {
-    const READ_SIZE: usize = Flash::READ_SIZE;
-
-    async fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), ChipError> {
-        let place = self.place(at, bytes.len())?;
-        self.chip.read(place, bytes).await
-    }
-
-    fn capacity(&self) -> usize {
-        self.size as usize
-    }
-}
-
-impl NorFlash for Part {
-    const WRITE_SIZE: usize = Flash::WRITE_SIZE;
-    const ERASE_SIZE: usize = Flash::ERASE_SIZE;
-
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), ChipError> {
-        let place = self.place(from, (to - from) as usize)?;
-        self.chip.erase(place, place + (to - from)).await
-    }
-
-    async fn write(&mut self, at: u32, bytes: &[u8]) -> Result<(), ChipError> {
-        let place = self.place(at, bytes.len())?;
-        self.chip.write(place, bytes).await
-    }
-}
-
-impl MultiwriteNorFlash for Part {}
-
-struct Slots {
-    running: Slot,
-    other: Part,
-    choice: Part,
-    restarted: Rc<Cell<bool>>,
-}
-
-impl FirmwareSlots for Slots {
-    type Slot = Part;
-    type Choice = Part;
-
-    fn board(&self) -> &'static str {
-        BOARD
-    }
-
-    fn running(&self) -> Slot {
-        self.running
-    }
-
-    fn other(&mut self) -> &mut Part {
-        &mut self.other
-    }
-
-    fn choice(&mut self) -> &mut Part {
-        &mut self.choice
-    }
-
-    async fn restart(&mut self) -> ! {
-        self.restarted.set(true);
-        std::future::pending().await
-    }
+    slots::choice(flash.clone(), 0)
 }
 
 struct NoServos;
@@ -186,7 +79,7 @@ impl Machine {
     pub fn start(flash: &Flash, server: &Server, address: &str, world: World) -> Option<Self> {
         let time = HandTime::take();
         let running = choice(flash).slot();
-        let mut boot_choice = part(flash, 0, 2 * 4096);
+        let mut boot_choice = Part::choice(flash.clone(), 0);
         let standing = block_on(update::at_start(&mut boot_choice, running))?;
         let mut settings = Settings {
             update_address: ManifestAddress::new(address),
@@ -204,12 +97,8 @@ impl Machine {
         };
         let house = Rc::new(House::new(ArmData::default(), settings, IDENTITY, vitals));
         let restarted = Rc::new(Cell::new(false));
-        let slots = Slots {
-            running,
-            other: part(flash, start_of(running.other()), SLOT as u32),
-            choice: boot_choice,
-            restarted: restarted.clone(),
-        };
+        let set = restarted.clone();
+        let slots = Slots::new(flash, 0, running, Rc::new(move || set.set(true)));
         let tasks = Tasks::default();
         let spawner = tasks.spawner();
         if world.tick {

@@ -10,7 +10,5 @@ mod dice;
 mod machine;
 mod offers;
 mod refusals;
-mod release;
-mod server;
 mod success;
 mod trial;

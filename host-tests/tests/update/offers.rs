@@ -1,10 +1,10 @@
 //! Updates from a file that is handed over: the same checks, without a server.
 
-use crate::machine::{Machine, OLD, SLOT, WORLD, choice, flash, slot};
-use crate::release::{Release, sign};
-use crate::server::Server;
-use ed25519_dalek::SigningKey;
+use crate::machine::{Machine, WORLD, choice, flash, slot};
 use embassy_time::Duration;
+use host_tests::scripted::release::{Release, SigningKey, address, sign};
+use host_tests::scripted::server::Server;
+use host_tests::scripted::slots::{OLD, SLOT};
 use protocol_core::update::{Rejection, Slot, Version};
 
 /// Longer than a page, and not whole words.
@@ -124,7 +124,7 @@ fn one_at_a_time_wherever_it_comes_from() {
     let release = Release::of(SIZE);
     let flash = flash();
     let server = release.served();
-    let mut machine = Machine::start(&flash, &server, &crate::release::address(), WORLD).unwrap();
+    let mut machine = Machine::start(&flash, &server, &address(), WORLD).unwrap();
     let text = release.manifest();
     let first = machine.hand_over(&text, SIZE, &release.image, false);
     machine.pass(Duration::from_secs(2), || false);

@@ -1,10 +1,12 @@
 //! Updates that are refused: each with its reason, with what runs and what starts untouched.
 
-use crate::machine::{Machine, OLD, SLOT, WORLD, choice, flash, slot};
-use crate::release::{IMAGE, MANIFEST, Release, address, development_key, sign};
-use crate::server::{Answer, End, HOST, Server};
-use ed25519_dalek::SigningKey;
+use crate::machine::{Machine, WORLD, choice, flash, slot};
 use embassy_time::Duration;
+use host_tests::scripted::release::{
+    IMAGE, MANIFEST, Release, SigningKey, address, development_key, sign,
+};
+use host_tests::scripted::server::{Answer, End, HOST, Server};
+use host_tests::scripted::slots::{OLD, SLOT};
 use protocol_core::motion::Micros;
 use protocol_core::update::{Rejection, Slot, Standing, Version};
 

@@ -1,9 +1,10 @@
 //! Good updates.
 
-use crate::machine::{Machine, OLD, SLOT, WORLD, choice, flash, slot};
-use crate::release::{IMAGE, MANIFEST, Release, address};
-use crate::server::{Answer, HOST, PORT, Server};
+use crate::machine::{Machine, WORLD, choice, flash, slot};
 use embassy_time::{Duration, Instant};
+use host_tests::scripted::release::{IMAGE, MANIFEST, Release, address};
+use host_tests::scripted::server::{Answer, HOST, PORT, Server};
+use host_tests::scripted::slots::{OLD, SLOT};
 use protocol_core::update::{Rejection, Slot, Standing, Version};
 
 const NEW: Version = Version::new(9, 0, 0);
@@ -101,7 +102,10 @@ fn moves_wait_until_the_update_has_ended() {
     let release = Release::of(3000);
     let (flash, server) = (flash(), release.served());
     let short = Answer::file(&release.image).paced(100, Duration::from_secs(1));
-    server.put(IMAGE, short.cut(1500, crate::server::End::Close));
+    server.put(
+        IMAGE,
+        short.cut(1500, host_tests::scripted::server::End::Close),
+    );
     let mut machine = Machine::start(&flash, &server, &address(), WORLD).unwrap();
     let outcome = machine.ask();
     machine.pass(Duration::from_secs(3), || false);

@@ -1,9 +1,9 @@
 //! New firmware on trial.
 
 use crate::machine::{Flash, Machine, WORLD, World, choice, flash};
-use crate::release::{Release, address};
-use crate::server::Server;
 use embassy_time::Duration;
+use host_tests::scripted::release::{Release, address};
+use host_tests::scripted::server::Server;
 use protocol_core::update::{Rejection, Slot, Standing, Version};
 
 fn updated() -> (Flash, Server) {

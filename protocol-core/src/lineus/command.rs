@@ -290,7 +290,7 @@ fn position<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         None => Ok(Command::Position),
         Some('S') => {
             words.no_value('S')?;
-            without_parameters(words, Command::Angles)
+            nothing_after('S', words, Command::Angles)
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -304,7 +304,7 @@ fn calibration<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
             if !text.is("clear") {
                 return Err(Refusal::BadText('S', text.raw(), "'clear'"));
             }
-            without_parameters(words, Command::ClearCalibration)
+            nothing_after('S', words, Command::ClearCalibration)
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -319,7 +319,7 @@ fn name<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
                 .unescape::<MAX_NAME>()
                 .and_then(|name| MachineName::new(str::from_utf8(&name).ok()?))
                 .ok_or(Refusal::BadName(text.raw()))?;
-            without_parameters(words, Command::Rename(name))
+            nothing_after('P', words, Command::Rename(name))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -330,7 +330,7 @@ fn waves<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         None => Ok(Command::Waves),
         Some('S') => {
             let on = choice(words, 'S', 2)? == 1;
-            without_parameters(words, Command::SetWaves(on))
+            nothing_after('S', words, Command::SetWaves(on))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -380,7 +380,7 @@ fn forget<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
                 b"*" => Command::ForgetAll,
                 _ => Command::Forget(ssid),
             };
-            without_parameters(words, command)
+            nothing_after('S', words, command)
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -400,7 +400,7 @@ fn update<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
                     Some(address.ok_or(Refusal::BadAddress(text.raw()))?)
                 }
             };
-            without_parameters(words, Command::SetUpdateAddress(address))
+            nothing_after('S', words, Command::SetUpdateAddress(address))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -416,7 +416,7 @@ fn own_network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
                 [] => None,
                 _ => Some(network_password(&text)?),
             };
-            without_parameters(words, Command::ProtectOwnNetwork(password))
+            nothing_after('P', words, Command::ProtectOwnNetwork(password))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -548,23 +548,20 @@ fn choice<'a>(words: &mut Words<'a>, letter: char, most: u8) -> Result<u8, Refus
 fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Command, Refusal<'a>> {
     match words.letter()? {
         None => Ok(command),
-        Some(letter @ ('S' | 'P'))
-            if matches!(
-                command,
-                Command::Angles
-                    | Command::ClearCalibration
-                    | Command::Rename(_)
-                    | Command::ProtectOwnNetwork(_)
-                    | Command::SetWaves(_)
-                    | Command::Forget(_)
-                    | Command::ForgetAll
-                    | Command::SetUpdateAddress(_)
-                    | Command::FactoryReset
-            ) =>
-        {
-            Err(Refusal::Repeated(letter))
-        }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
+    }
+}
+
+/// The command, if nothing more follows the only letter that it has.
+fn nothing_after<'a>(
+    only: char,
+    words: &mut Words<'a>,
+    command: Command,
+) -> Result<Command, Refusal<'a>> {
+    match words.letter()? {
+        Some(letter) if letter == only => Err(Refusal::Repeated(letter)),
+        Some(letter) => Err(Refusal::UnknownParameter(letter)),
+        None => Ok(command),
     }
 }
 

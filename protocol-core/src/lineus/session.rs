@@ -456,6 +456,8 @@ mod tests {
             ("G01.5 X5", "unknown command 'G01.5'"),
             ("M9999", "unknown command 'M9999'"),
             ("G01 Q5", "unknown parameter Q"),
+            ("M114 S P", "unknown parameter P"),
+            ("M589 P12345678 S1", "unknown parameter S"),
             ("G01 X5 X6", "parameter X is repeated"),
             ("G01 X5 F1 F2", "parameter F is repeated"),
             ("G01 X", "X has no number"),

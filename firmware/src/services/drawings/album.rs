@@ -434,9 +434,15 @@ impl<F: NorFlash> Album<F> {
         Ok(())
     }
 
-    /// Marks a drawing as ended; where the mark is not taken, its first sheet is erased.
+    /// Marks a drawing as ended; where the mark is not taken, its first sheet is erased. Says whether a restart
+    /// finds it no more: a worn flash may take both without doing either.
     async fn strike(&mut self, stored: Stored) -> bool {
-        self.write(stored.first, STRIKE as usize, &STRUCK).await || self.erase(stored.first).await
+        if self.write(stored.first, STRIKE as usize, &STRUCK).await {
+            return true;
+        }
+        let erased = self.erase(stored.first).await;
+        let left = self.read_head(stored.first).await;
+        erased && left.is_some_and(|bytes| Head::read(&bytes).is_none())
     }
 
     /// Reads bytes of the drawing of this sequence number into `bytes`, and gives how many: at least one,

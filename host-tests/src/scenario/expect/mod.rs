@@ -72,6 +72,25 @@ pub fn expect(
             let off = stage.pass_time(patience, |stage| !stage.board.power.is_on())?;
             off.then_some(()).ok_or("power is on".into())
         }
+        Expectation::StartsAgain => {
+            if !stage.pass_time(patience, |stage| stage.board.restarts > 0)? {
+                return Err("it goes on".into());
+            }
+            stage.board.restarts -= 1;
+            stage.begin();
+            Ok(())
+        }
+        Expectation::MayStartAgain => {
+            stage.starts_allowed = true;
+            Ok(())
+        }
+        Expectation::Runs(names) => {
+            let running = stage.board.running().unwrap_or("nothing");
+            match names.iter().any(|name| name == running) {
+                true => Ok(()),
+                false => Err(format!("it runs {running}")),
+            }
+        }
         Expectation::IsFound(host) => {
             let found = stage.pass_time(patience, |stage| stage.board.found_as() == *host)?;
             let now = || stage.board.found_as().unwrap_or("nothing".into());
@@ -89,8 +108,11 @@ pub fn expect(
     }
 }
 
-/// Forgets the attempts that a line has allowed.
-pub fn forgive_tries(stage: &mut Stage) {
+/// Forgets what a line has allowed: attempts to join, and starts.
+pub fn forgive(stage: &mut Stage) {
+    if stage.starts_allowed {
+        stage.board.restarts = 0;
+    }
     if let Some(allowed) = &stage.tries_allowed {
         let mut tries = stage.board.radio.tries.borrow_mut();
         tries.retain(|(ssid, _)| ssid != allowed);

@@ -1,6 +1,6 @@
 //! Commands about this arm and its paper, and two of motion: G4, G31, G40, M171, M280.
 
-use super::{Axes, Command, Letters, choice, coordinate, fixed, without_parameters};
+use super::{Axes, Command, Letters, choice, coordinate, fixed, nothing_after};
 use crate::arm::{NibShift, ZMap};
 use crate::lineus::Refusal;
 use crate::machine::Bare;
@@ -111,7 +111,7 @@ pub(super) fn factory_reset<'a>(words: &mut Words<'a>) -> Result<Command, Refusa
             if !text.is("confirm") {
                 return Err(Refusal::BadText('S', text.raw(), "'confirm'"));
             }
-            without_parameters(words, Command::FactoryReset)
+            nothing_after('S', words, Command::FactoryReset)
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }

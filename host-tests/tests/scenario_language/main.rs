@@ -1,6 +1,9 @@
 //! A scenario fails when it should: each kind of expectation, what is left over, what is no line, and what
 //! it says then. Where a network is joined, it is by M587, so that little is assumed about the policy.
 
+mod coverage;
+mod updates;
+
 use host_tests::scenario::{Failure, play};
 
 /// Four lines.
@@ -374,6 +377,19 @@ fn a_line_that_says_nothing_fails_before_anything_is_played() {
         ("network home up, password short", "8 to 63 bytes"),
         ("network home, -50", "a strength has a unit"),
         ("the memory is full", "empty, garbage, worn out or well"),
+        ("the memory holds update address x", "an address is http://"),
+        ("the server flies", "the server does no such thing"),
+        ("the server offers nine", "a version is three numbers"),
+        (
+            "the server offers 9.0.0 gladly",
+            "\"gladly\" is not understood",
+        ),
+        ("the server closes after 5", "a number of bytes is missing"),
+        (
+            "the server sends 0 bytes every 1 s",
+            "a number of bytes every so often",
+        ),
+        ("the server's name is x", "a manifest and an image"),
         ("for each N from 1 to 2", "no such line"),
     ] {
         let failure = failure(&format!("power on\n{line}\n"));
@@ -421,25 +437,4 @@ fn the_same_scenario_goes_the_same_way() {
         format!("{CONNECTED}{AT_HOME}B hears hello ...\nA sends M122\nB sends M122\nB hears x");
     let once = failure(&text).to_string();
     assert_eq!(once, failure(&text).to_string());
-}
-
-#[test]
-fn every_transition_of_the_documentation_has_its_scenario() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenarios");
-    let mut played: Vec<String> = std::fs::read_dir(folder)
-        .expect("there are scenarios")
-        .map(|entry| entry.expect("a folder can be read").file_name())
-        .filter_map(|name| name.to_str()?.get(..3).map(str::to_owned))
-        .filter(|start| start.ends_with('-') && start.starts_with(|c: char| c.is_ascii_digit()))
-        .collect();
-    played.sort();
-    let table = include_str!("../../docs/wifi.md");
-    let rows: Vec<String> = table
-        .lines()
-        .filter_map(|line| line.strip_prefix("| "))
-        .filter(|row| row.starts_with(|c: char| c.is_ascii_digit()))
-        .filter_map(|row| row.get(..2).map(|number| format!("{number}-")))
-        .collect();
-    assert!(rows.len() >= 30, "{rows:?}");
-    assert_eq!(rows, played);
 }

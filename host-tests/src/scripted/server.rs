@@ -1,4 +1,4 @@
-//! A web server in a script's hands, at the other end of a network without a wire.
+//! A web server in a script's hands, and the way to it, where there is one.
 
 use edge_nal::{AddrType, Close, Dns, Readable, TcpConnect, TcpShutdown, TcpSplit};
 use embassy_time::{Duration, Timer};
@@ -10,16 +10,23 @@ use std::future::pending;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::rc::Rc;
 
-/// The server's name, port and address.
+/// Whether there is a way again, this is looked for so often.
+const LOOK: Duration = Duration::from_millis(100);
+/// The server's name.
 pub const HOST: &str = "updates.example";
+/// Its port.
 pub const PORT: u16 = 8000;
+/// Its address.
 const ADDRESS: IpAddr = IpAddr::V4(Ipv4Addr::new(192, 0, 2, 7));
 
 /// What comes after all of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
+    /// The connection is closed.
     Close,
+    /// It breaks.
     Break,
+    /// Nothing, without an end.
     Silence,
     /// More and more of the same.
     Endless,
@@ -28,10 +35,13 @@ pub enum End {
 /// What the server says when it is asked for a file.
 #[derive(Clone, Debug)]
 pub struct Answer {
+    /// Head and body.
     pub bytes: Vec<u8>,
-    /// Bytes at a time, and the time between.
+    /// Bytes at a time.
     pub piece: usize,
+    /// Time between two pieces.
     pub every: Duration,
+    /// What comes then.
     pub end: End,
 }
 
@@ -42,6 +52,7 @@ impl Answer {
         Self::with("200 OK", &[("Content-Length", &length)], content)
     }
 
+    /// A head with these headers, and what follows it.
     pub fn with(status: &str, headers: &[(&str, &str)], content: &[u8]) -> Self {
         let mut bytes = format!("HTTP/1.1 {status}\r\nServer: script\r\n").into_bytes();
         for (name, value) in headers {
@@ -52,6 +63,7 @@ impl Answer {
         Self::raw(&bytes)
     }
 
+    /// These bytes, HTTP or not.
     pub fn raw(bytes: &[u8]) -> Self {
         Self {
             bytes: bytes.to_vec(),
@@ -68,6 +80,7 @@ impl Answer {
         self
     }
 
+    /// Not all at once.
     pub fn paced(self, piece: usize, every: Duration) -> Self {
         Self {
             piece,
@@ -77,7 +90,7 @@ impl Answer {
     }
 }
 
-/// The server, and the way to it.
+/// The server.
 #[derive(Clone, Default)]
 pub struct Server(Rc<State>);
 
@@ -86,16 +99,50 @@ struct State {
     files: RefCell<HashMap<String, Answer>>,
     asked: RefCell<Vec<String>>,
     gone: Cell<bool>,
+    way: RefCell<Option<Way>>,
 }
 
+/// Says whether the machine's network leads to the server.
+type Way = Box<dyn Fn() -> bool>;
+
 impl Server {
+    /// A file, or another answer in its place.
     pub fn put(&self, path: &str, answer: Answer) {
         self.0.files.borrow_mut().insert(path.into(), answer);
+    }
+
+    /// Changes what is answered at a path, if there is anything.
+    pub fn change(&self, path: &str, change: impl FnOnce(Answer) -> Answer) {
+        if let Some(answer) = self.0.files.borrow_mut().get_mut(path) {
+            *answer = change(answer.clone());
+        }
     }
 
     /// Nobody answers any more.
     pub fn vanish(&self) {
         self.0.gone.set(true);
+    }
+
+    /// It answers again, if it had vanished.
+    pub fn come_back(&self) {
+        self.0.gone.set(false);
+    }
+
+    /// It is reached only while `way` says so.
+    pub fn behind(&self, way: impl Fn() -> bool + 'static) {
+        self.0.way.replace(Some(Box::new(way)));
+    }
+
+    fn is_reachable(&self) -> bool {
+        let way = self.0.way.borrow();
+        !self.0.gone.get() && way.as_ref().is_none_or(|way| way())
+    }
+
+    /// As long as there is no way to it, nothing comes and nothing is lost.
+    async fn reach(&self) {
+        while !self.is_reachable() {
+            Timer::after(LOOK).await;
+        }
     }
 
     /// Requests so far.
@@ -104,6 +151,7 @@ impl Server {
     }
 }
 
+/// There is nobody, or nobody any more.
 #[derive(Clone, Copy, Debug)]
 pub struct Broken;
 
@@ -124,7 +172,11 @@ impl embedded_io_async::Error for Broken {
 impl Dns for Server {
     type Error = Broken;
 
+    /// Who knows the names is not in the server's house.
     async fn get_host_by_name(&self, host: &str, _: AddrType) -> Result<IpAddr, Broken> {
+        while self.0.way.borrow().as_ref().is_some_and(|way| !way()) {
+            Timer::after(LOOK).await;
+        }
         match host {
             HOST => Ok(ADDRESS),
             "slow.example" => pending().await,
@@ -142,8 +194,8 @@ impl TcpConnect for Server {
     type Socket<'a> = Socket;
 
     async fn connect(&self, remote: SocketAddr) -> Result<Socket, Broken> {
+        self.reach().await;
         match remote {
-            _ if self.0.gone.get() => pending().await,
             SocketAddr::V4(v4) if (IpAddr::V4(*v4.ip()), v4.port()) == (ADDRESS, PORT) => {
                 Ok(Socket {
                     server: self.clone(),
@@ -157,6 +209,7 @@ impl TcpConnect for Server {
     }
 }
 
+/// A connection to it.
 pub struct Socket {
     server: Server,
     request: Vec<u8>,
@@ -174,9 +227,7 @@ impl Read for Socket {
             self.answer = Some(self.asked());
         }
         let answer = self.answer.as_ref().ok_or(Broken)?;
-        if self.server.0.gone.get() {
-            pending::<()>().await;
-        }
+        self.server.reach().await;
         let rest = &answer.bytes[self.sent..];
         if rest.is_empty() {
             return match answer.end {
