@@ -16,6 +16,7 @@ pub use offer::Handover;
 pub use trust::KEY_NAME;
 
 use super::House;
+use super::arm::Rest;
 use crate::board::FirmwareSlots;
 use crate::log::{info, warning};
 use core::cell::Cell;
@@ -200,10 +201,11 @@ where
         let outcome = perform(house, &network, &mut slots, source).await;
         house.panel.show_first(None);
         match outcome {
-            Ok(version) => {
+            // The arm rests until the end: a move that began now would be cut off, maybe with its pen down.
+            Ok((version, _rest)) => {
                 info!("new firmware is in place, starting it");
                 update.show(Progress::Restarting(version));
-                update.tell(ticket, outcome);
+                update.tell(ticket, Ok(version));
                 Timer::after(FAREWELL).await;
                 slots.restart().await;
             }
@@ -213,13 +215,19 @@ where
                     status.progress = Progress::Idle;
                     status.refused = Some(rejection);
                 });
-                update.tell(ticket, outcome);
+                update.tell(ticket, Err(rejection));
             }
         }
     }
 }
 
-async fn perform<N, S>(house: &House, network: &N, slots: &mut S, source: Source) -> Outcome
+/// Gives the version that is in place, and the arm at rest.
+async fn perform<'a, N, S>(
+    house: &'a House,
+    network: &N,
+    slots: &mut S,
+    source: Source,
+) -> Result<(Version, Rest<'a>), Rejection>
 where
     N: TcpConnect + Dns,
     S: FirmwareSlots,
@@ -250,7 +258,7 @@ where
 
     let version = manifest.version;
     house.update.show(Progress::Waiting(version));
-    let _rest = rest(house).await?;
+    let rest = rest(house).await?;
     house.panel.show_first(Some(Lamp::Update));
     let show = |percent| {
         house.update.show(Progress::Loading { version, percent });
@@ -273,11 +281,11 @@ where
     let manifest = trust::read(text)?;
     install::check(slots.other(), &manifest).await?;
     boot::switch(slots, version).await?;
-    Ok(version)
+    Ok((version, rest))
 }
 
 /// Waits until nothing is drawn or recorded and the pen is up, and keeps the arm so: a restart loses nobody's work.
-async fn rest(house: &House) -> Result<super::arm::Rest<'_>, Rejection> {
+async fn rest(house: &House) -> Result<Rest<'_>, Rejection> {
     let until = Instant::now() + duration(ARM_TIME);
     let is_done = || {
         let is_up = |machine: &mut Machine| !machine.position().pen_is_down();
