@@ -9,5 +9,5 @@ pub mod serial;
 mod web;
 
 pub use client::{Client, TERMINATOR};
-pub use process::{Desktop, PORT, Run, binary, draw, target_folder, wait_until};
+pub use process::{Desktop, PORT, Run, binary, draw, own_address, target_folder, wait_until};
 pub use web::{Answer, Web, WebSocket};
