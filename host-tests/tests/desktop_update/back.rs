@@ -26,7 +26,7 @@ fn back() -> String {
 #[test]
 fn three_cuts_of_power_during_the_trial_and_the_old_one_is_back() {
     let bench = Bench::new();
-    let arm = bench.update(Release::script(""), &[]);
+    let arm = bench.update(Release::script(""));
     arm.wait_to_say(READY, 2);
     assert_eq!(told(&mut arm.client()), "on trial, start 1 of 3");
     arm.cut_power();
@@ -63,7 +63,7 @@ fn a_firmware_that_ends_with_an_error_three_times_is_gone_without_a_hand() {
     // A file that is not there, an option that it does not know.
     for argument in ["--air=/nowhere/at/all", "--no-such-option"] {
         let bench = Bench::new();
-        let arm = bench.update(with(argument, &bench), &[]);
+        let arm = bench.update(with(argument, &bench));
         arm.wait_to_say(READY, 2);
         assert_eq!(arm.count("back to the old one"), 1, "{argument}");
         assert_eq!(arm.count("firmware first of "), 2, "{argument}");
@@ -76,7 +76,7 @@ fn a_firmware_that_ends_with_an_error_three_times_is_gone_without_a_hand() {
 #[test]
 fn a_firmware_that_hangs_three_times_is_gone_without_a_hand() {
     let bench = Bench::new();
-    let arm = bench.update(Release::script(""), &[]);
+    let arm = bench.update(Release::script(""));
     arm.wait_to_say(READY, 2);
     arm.cut_power();
 
@@ -135,7 +135,7 @@ fn an_image_that_is_no_program_is_passed_over_and_given_up() {
     let trap = bench.path().join("trap");
     // No shell gets it, either.
     let image = format!("touch '{}'\n", trap.display());
-    let arm = bench.update(Release::of(image), &[]);
+    let arm = bench.update(Release::of(image));
     arm.wait_to_say(READY, 2);
     assert_eq!(arm.count("second: Exec format error"), 1);
     assert_eq!(arm.count("firmware first of "), 2);

@@ -34,15 +34,16 @@ impl Bench {
         self.path().join("firmware").join(name)
     }
 
+    /// At rest its time is the wall's.
     fn start(&self, arguments: &[&str]) -> Desktop {
         let place = self.slot("").display().to_string();
-        let arguments = [&["--firmware", &place], arguments].concat();
+        let arguments = [&["--speed", "max", "--firmware", &place], arguments].concat();
         Desktop::start(self.path(), &arguments)
     }
 
     /// Starts an arm, which runs the firmware that was built, and has it take a release.
-    fn update(&self, release: Release, arguments: &[&str]) -> Desktop {
-        let arm = self.start(arguments);
+    fn update(&self, release: Release) -> Desktop {
+        let arm = self.start(&[]);
         assert!(arm.said("firmware first of "));
         let mut client = arm.client();
         assert_eq!(told(&mut client), "none");
@@ -80,14 +81,11 @@ fn a_new_firmware_that_works_stays() {
     let trace = bench.path().join("trace.csv");
     let port = bench.path().join("port");
     let arguments = [
-        "--speed",
-        "max",
         "--trace",
         &trace.display().to_string(),
         "--serial",
         &port.display().to_string(),
     ];
-    let built = fs::read(binary()).expect("the program can be read");
     let arm = bench.start(&arguments);
     assert_eq!(arm.program(), binary());
     let mut client = arm.client();
@@ -99,7 +97,7 @@ fn a_new_firmware_that_works_stays() {
     client.wait_for_place("ok X:1400 Y:0 Z:1000");
     let terminal = fs::read_link(&port).expect("there is a serial port");
     assert_eq!(
-        ask(&mut client, Release::of(built)),
+        ask(&mut client, Release::program()),
         "ok INFO:\"9.0.0 is in place and starts now\""
     );
     arm.wait_to_say(READY, 2);
@@ -154,7 +152,7 @@ fn a_new_firmware_that_works_stays() {
 #[test]
 fn the_firmware_after_the_next_takes_the_first_place() {
     let bench = Bench::new();
-    let arm = bench.update(Release::script(""), &["--speed", "max"]);
+    let arm = bench.update(Release::script(""));
     arm.wait_to_say(READY, 2);
     assert!(arm.said("firmware second of "));
     let mut client = arm.client();

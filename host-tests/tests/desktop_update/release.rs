@@ -4,6 +4,7 @@ use ed25519_dalek::{Signer, SigningKey};
 use firmware::boards::desktop::slots;
 use host_tests::desktop::binary;
 use sha2::{Digest, Sha256};
+use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::thread;
@@ -25,6 +26,13 @@ impl Release {
             image: image.into(),
             key: development_key(),
         }
+    }
+
+    /// The arm's program, without what is for debuggers.
+    pub fn program() -> Self {
+        let mut image = fs::read(binary()).expect("the program can be read");
+        image.truncate(end_of_segments(&image).expect("the program is an ELF file of 64 bits"));
+        Self::of(image)
     }
 
     /// Firmware that does what the arm's program does with some more arguments: a script, which is as good a
@@ -79,6 +87,24 @@ impl Release {
         )?;
         stream.write_all(content)
     }
+}
+
+/// Where what is loaded of an ELF file ends: sections of a debug build lie behind it.
+fn end_of_segments(file: &[u8]) -> Option<usize> {
+    let number = |at: usize, length: usize| {
+        let mut bytes = [0; 8];
+        bytes[..length].copy_from_slice(file.get(at..at + length)?);
+        usize::try_from(u64::from_le_bytes(bytes)).ok()
+    };
+    if !file.starts_with(b"\x7fELF\x02\x01") {
+        return None;
+    }
+    let (table, entry, count) = (number(0x20, 8)?, number(0x36, 2)?, number(0x38, 2)?);
+    let ends = (0..count).map(|index| {
+        let header = table + index * entry;
+        Some(number(header + 0x08, 8)? + number(header + 0x20, 8)?)
+    });
+    ends.collect::<Option<Vec<_>>>()?.into_iter().max()
 }
 
 fn development_key() -> SigningKey {
