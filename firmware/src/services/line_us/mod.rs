@@ -126,6 +126,10 @@ pub async fn answer(
     }
 }
 
+/// How a browser begins, on behalf of any page that names this port: a form may have G-code in it. Other
+/// methods come only after the answer to one of these has allowed them.
+const BROWSER: [&[u8]; 4] = [b"GET ", b"HEAD ", b"POST ", b"OPTIONS "];
+
 /// Serves one connection until its client has closed it and everything received is executed.
 pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     let mut session = Session::new();
@@ -134,8 +138,14 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
+    let mut begun = false;
     while let Ok(length @ 1..) = answers.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
+        if !begun && BROWSER.iter().any(|start| input.starts_with(start)) {
+            info!("a browser is at the wrong port");
+            break;
+        }
+        begun = true;
         while let Some(request) = session.next_request(&mut input, &mut reply) {
             answer(&request, &mut session, &mut reply, client, house).await;
             answers.send(&reply).await;
