@@ -22,6 +22,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
+use heapless::Vec;
 use protocol_core::lineus::{Reply, Request, Session};
 use protocol_core::machine::{Client, MAX_CLIENTS};
 
@@ -138,14 +139,17 @@ pub async fn serve(socket: impl Read + Write, client: Client, house: &House) {
     reply.hello(&house.name(), house.identity);
     answers.send(&reply).await;
     let mut chunk = [0; CHUNK];
-    let mut begun = false;
+    let mut start = Vec::<u8, 8>::new();
     while let Ok(length @ 1..) = answers.read(&mut chunk).await {
         let mut input = chunk.get(..length).unwrap_or_default();
-        if !begun && BROWSER.iter().any(|start| input.starts_with(start)) {
-            info!("a browser is at the wrong port");
-            break;
+        if !start.is_full() {
+            let missing = start.capacity() - start.len();
+            start.extend(input.iter().take(missing).copied());
+            if BROWSER.iter().any(|method| start.starts_with(method)) {
+                info!("a browser is at the wrong port");
+                break;
+            }
         }
-        begun = true;
         while let Some(request) = session.next_request(&mut input, &mut reply) {
             answer(&request, &mut session, &mut reply, client, house).await;
             answers.send(&reply).await;
