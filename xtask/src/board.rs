@@ -39,6 +39,15 @@ impl Board {
         }
     }
 
+    /// What manifests call it: a desktop's program is for one kind of processor and system, that of this
+    /// computer.
+    pub fn manifest_name(self) -> &'static str {
+        match self {
+            Self::Desktop => firmware::boards::desktop::slots::board(),
+            other => other.name(),
+        }
+    }
+
     /// What the compiler calls it; `None` for this computer.
     pub const fn target(self) -> Option<&'static str> {
         match self {

@@ -30,6 +30,7 @@ pub fn emulate(options: Emulate, setup: bool) -> Result<()> {
     let outputs = Outputs {
         trace: options.trace,
         picture: Some(options.picture.clone()),
+        go_on: false,
     };
     let (recorder, mut servos) = Recorder::start(outputs, ArmData::default(), false)?;
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;

@@ -1,6 +1,7 @@
 //! One file for a chip's flash: bootloader, partition table and firmware, and settings if they are given.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
+use firmware::boards::desktop::slots::SLOT_SIZE;
 use std::fs;
 use std::path::{Path, PathBuf};
 use xtask::board::{Board, own_cargo, root, run, target_dir};
@@ -13,6 +14,15 @@ pub fn slot_image(board: Board, setup: bool) -> Result<Vec<u8>> {
     if board == Board::Virt {
         let firmware = board.build(board.binary(), &[], setup)?;
         return slots::flatten(&firmware);
+    }
+    if board == Board::Desktop {
+        let program = board.build(board.binary(), &[], setup)?;
+        let image = fs::read(&program).with_context(|| program.display().to_string())?;
+        ensure!(
+            image.len() <= SLOT_SIZE as usize,
+            "the program does not fit a slot"
+        );
+        return Ok(image);
     }
     let mut file = image(board, &Owner::default(), setup)?.into_os_string();
     file.push(".app");

@@ -194,7 +194,7 @@ fn make_release(what: Release, setup: bool) -> Result<()> {
             key,
         }) => {
             let version = Version::parse(&version).context("a version is three numbers")?;
-            let text = release::manifest(board.name(), version, &image, &key_of(key)?)?;
+            let text = release::manifest(board.manifest_name(), version, &image, &key_of(key)?)?;
             print!("{text}");
         }
         None => {
@@ -206,7 +206,7 @@ fn make_release(what: Release, setup: bool) -> Result<()> {
                 Err(_) => Version::FIRMWARE,
             };
             let image = image::slot_image(board, setup)?;
-            let place = release::release(board.name(), version, &image, &key, &what.to)?;
+            let place = release::release(board.manifest_name(), version, &image, &key, &what.to)?;
             println!("{}", place.display());
         }
     }

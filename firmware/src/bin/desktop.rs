@@ -7,15 +7,18 @@ use edge_nal::TcpAccept;
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::{SpawnError, Spawner};
 use embassy_time::{Duration, Timer};
-use firmware::board::NoInputs;
+use firmware::board::{FirmwareSlots, NoInputs, Vitals};
 use firmware::boards::desktop::air;
+use firmware::boards::desktop::bootloader::{self, Reset, Running};
 use firmware::boards::desktop::clock::{self, Speed};
 use firmware::boards::desktop::draw::{self, Outcome, Script};
 use firmware::boards::desktop::draw_lasaur::{self, Listener as Replies, Sender};
 use firmware::boards::desktop::flash::{self, FileFlash};
-use firmware::boards::desktop::net::{Listener, Multicast};
+use firmware::boards::desktop::net::{Listener, Multicast, Outside};
 use firmware::boards::desktop::pty::{self, Pty};
 use firmware::boards::desktop::recorder::{Outputs, RecordedServos, Recorder, Totals};
+use firmware::boards::desktop::slots::{self, FileSlots};
+use firmware::boards::desktop::trial;
 use firmware::boards::desktop::{IDENTITY, NoAddress, VITALS, own_network};
 use firmware::boards::scripted_radio::{Air, OnAir, Pace, ScriptedRadio};
 use firmware::services::House;
@@ -25,10 +28,11 @@ use firmware::services::drawings::Album;
 use firmware::services::line_us::{Server, serve};
 use firmware::services::serial::{self, ReadError};
 use firmware::services::storage::Memory;
-use firmware::services::{drawer, network, web};
+use firmware::services::{drawer, network, update, web};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol_core::machine::{ArmData, Client, MAX_CLIENTS, StopReason};
 use protocol_core::motion::Micros;
+use protocol_core::update::{KeyName, Standing};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -97,6 +101,12 @@ struct Serve {
     /// The file is read again when it changes. Without it, the arm is in the computer's own network.
     #[arg(long, value_name = "FILE")]
     air: Option<PathBuf>,
+    /// Where there is place for other firmware: M997 updates the arm
+    ///
+    /// Two programs, and which of them starts. Made if it does not exist. Firmware that believes the published
+    /// development key takes clients of this computer alone then.
+    #[arg(long, value_name = "FOLDER")]
+    firmware: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
@@ -170,20 +180,143 @@ fn main() -> ExitCode {
         .format(|out, record| writeln!(out, "{}", record.args()))
         .target(env_logger::Target::Stdout)
         .init();
-    let cli = Cli::parse();
-    let outcome = match cli.command {
-        Some(Command::Draw(options)) => draw_file(options),
-        None => run_arm(cli.serve),
-    };
-    outcome.unwrap_or_else(|error| {
+    perform().unwrap_or_else(|error| {
         eprintln!("error: {error}");
         ExitCode::FAILURE
     })
 }
 
-/// Serves until the program is told to stop.
-fn run_arm(options: Serve) -> io::Result<ExitCode> {
+fn perform() -> io::Result<ExitCode> {
+    // Before anything that may fail, like options that this firmware does not know.
+    let firmware = bootloader::running().map(Firmware::start).transpose()?;
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => match firmware.filter(|_| trial::lasts()) {
+            Some(firmware) => {
+                error.print()?;
+                return Err(firmware.running.restart(Reset::Failure));
+            }
+            None => error.exit(),
+        },
+    };
+    match cli.command {
+        Some(Command::Draw(options)) => draw_file(options),
+        None => run_arm(cli.serve, firmware),
+    }
+}
+
+/// The firmware that runs where there is place for two.
+struct Firmware {
+    running: Running,
+    slots: FileSlots,
+    standing: Standing,
+}
+
+impl Firmware {
+    /// Counts the start of a firmware on trial, or starts the other one.
+    fn start(running: Running) -> io::Result<Self> {
+        let mut slots = FileSlots::open(&running)?;
+        let standing = update::at_start(slots.choice(), running.slot);
+        let Some(standing) = embassy_futures::block_on(standing) else {
+            log::info!("the new firmware did not confirm itself: back to the old one");
+            return Err(running.restart(Reset::Firmware));
+        };
+        if let Standing::Trial { .. } = standing {
+            trial::begin(&running);
+        }
+        Ok(Self {
+            running,
+            slots,
+            standing,
+        })
+    }
+}
+
+/// How serving ends.
+enum End {
+    Stopped,
+    /// The firmware wants to be started again.
+    Restart,
+}
+
+/// Serves until the program is told to stop. Where there is place for two firmwares, it is the bootloader
+/// before that, unless it is the firmware in a slot already.
+fn run_arm(options: Serve, firmware: Option<Firmware>) -> io::Result<ExitCode> {
+    let firmware = match (firmware, &options.firmware) {
+        (Some(firmware), _) => firmware,
+        (None, Some(folder)) => {
+            keep_strangers_out(&options)?;
+            Firmware::start(bootloader::boot(folder)?)?
+        }
+        (None, None) => {
+            serve_until_end(options, None)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+    };
+    let running = firmware.running.clone();
+    if trial::lasts() {
+        trial::observe(&running, options.speed);
+    }
+    log::info!(
+        "firmware {} of {}",
+        slots::name(running.slot),
+        running.folder.display()
+    );
+    // An image may believe another key than the bootloader.
+    let ended =
+        keep_strangers_out(&options).and_then(|()| serve_until_end(options, Some(firmware)));
+    let on_trial = trial::lasts();
+    trial::end();
+    match ended {
+        Ok(End::Stopped) => Ok(ExitCode::SUCCESS),
+        Ok(End::Restart) => Err(running.restart(Reset::Firmware)),
+        Err(error) if on_trial => {
+            eprintln!("error: {error}");
+            Err(running.restart(Reset::Failure))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Whoever has the sources can sign with the development key, and an update is a program that runs as this
+/// user: then only those who are on this computer may ask for one.
+fn keep_strangers_out(options: &Serve) -> io::Result<()> {
+    if update::KEY_NAME != KeyName::Development {
+        return Ok(());
+    }
+    let web = match options.web {
+        Some(Web::At(address)) => Some(address),
+        None | Some(Web::Nowhere) => None,
+    };
+    let open = [
+        ("--line-us", Some(options.line_us)),
+        ("--web", web),
+        ("--serial-tcp", options.serial_tcp),
+    ];
+    for (option, address) in open {
+        let strange = address.filter(|address| !address.ip().to_canonical().is_loopback());
+        if let Some(address) = strange {
+            return Err(io::Error::new(
+                io::ErrorKind::PermissionDenied,
+                format!(
+                    "{option} {address} with --firmware: this firmware believes the published development \
+                     key, so whoever reaches it could run programs here. Build it with a key of your own \
+                     (QUILL_UPDATE_KEY, see docs/update.md), or take an address of 127.0.0.1"
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Serves until the program is told to stop, or the firmware wants to be started again.
+fn serve_until_end(options: Serve, firmware: Option<Firmware>) -> io::Result<End> {
     static STOP: AtomicBool = AtomicBool::new(false);
+    let reset = firmware.as_ref().and_then(|_| bootloader::reset());
+    let vitals = Vitals {
+        reset_reason: reset.map_or(VITALS.reset_reason, Reset::name),
+        ..VITALS
+    };
     let listener = embassy_futures::block_on(Listener::bind(options.line_us))
         .map_err(|error| named(&options.line_us, error))?;
     let listener: &'static Listener = Box::leak(Box::new(listener));
@@ -208,12 +341,13 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
     let outputs = Outputs {
         trace: options.common.trace.clone(),
         picture: Some(options.picture.clone()),
+        go_on: reset.is_some(),
     };
     let (recorder, servos) = Recorder::start(outputs, data, options.speed == Speed::Max)?;
     if let Some(file) = &options.air {
         air::read(file).map_err(|error| named(&file.display(), error))?;
     }
-    let (house, memory) = house(data, flash, options.air.is_none())?;
+    let (house, memory) = house(data, flash, options.air.is_none(), vitals)?;
     let album = album(drawings)?;
     let frame = options.common.frame();
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed)).map_err(io::Error::other)?;
@@ -237,6 +371,7 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
         web: web.as_ref().map(|(address, _)| address.port()),
     };
     let mut spawned = Ok(());
+    let has_slots = firmware.is_some();
     clock::run(
         options.speed,
         |spawner| {
@@ -255,14 +390,30 @@ fn run_arm(options: Serve) -> io::Result<ExitCode> {
                 if let Some(multicast) = multicast {
                     spawner.spawn(discovery(house, multicast, ports)?);
                 }
+                if let Some(firmware) = firmware {
+                    spawner.spawn(renew(house, firmware.slots, firmware.standing)?);
+                }
                 Ok(())
             });
         },
-        || STOP.load(Ordering::Relaxed),
+        || {
+            if has_slots {
+                trial::round(&house.update);
+            }
+            STOP.load(Ordering::Relaxed) || slots::restart_is_wanted()
+        },
     );
     spawned.map_err(io::Error::other)?;
-    recorder.finish()?;
-    Ok(ExitCode::SUCCESS)
+    // From here on the disk may take its time.
+    trial::end();
+    let finished = recorder.finish();
+    if !slots::restart_is_wanted() || STOP.load(Ordering::Relaxed) {
+        return finished.map(|_| End::Stopped);
+    }
+    if let Err(error) = finished {
+        log::error!("the picture or the trace cannot be written: {error}");
+    }
+    Ok(End::Restart)
 }
 
 fn named(what: &dyn std::fmt::Display, error: io::Error) -> io::Error {
@@ -432,6 +583,11 @@ async fn wifi(house: &'static House, networks: Option<PathBuf>) {
 }
 
 #[embassy_executor::task]
+async fn renew(house: &'static House, slots: FileSlots, standing: Standing) {
+    update::run(house, Outside, slots, standing).await;
+}
+
+#[embassy_executor::task]
 async fn discovery(house: &'static House, multicast: Multicast, ports: Ports) {
     discovery::run(house, &multicast, || Some(multicast.address()), ports).await;
 }
@@ -464,6 +620,7 @@ fn house(
     data: ArmData,
     flash: FileFlash,
     at_home: bool,
+    vitals: Vitals,
 ) -> io::Result<(&'static House, Memory<Flash>)> {
     let memory = Memory::new(BlockingAsync::new(flash), 0..flash::SIZE);
     let mut memory =
@@ -472,7 +629,7 @@ fn house(
     if at_home && settings.networks.is_empty() {
         let _ = settings.networks.put(own_network());
     }
-    let house = House::new(data, settings, IDENTITY, VITALS);
+    let house = House::new(data, settings, IDENTITY, vitals);
     Ok((Box::leak(Box::new(house)), memory))
 }
 
@@ -505,9 +662,10 @@ fn draw_file(options: Draw) -> io::Result<ExitCode> {
     let outputs = Outputs {
         trace: options.common.trace.clone(),
         picture: options.picture.clone(),
+        go_on: false,
     };
     let (recorder, servos) = Recorder::start(outputs, data, false)?;
-    let (house, memory) = house(data, FileFlash::in_memory(flash::SIZE), true)?;
+    let (house, memory) = house(data, FileFlash::in_memory(flash::SIZE), true, VITALS)?;
     let album = album(FileFlash::in_memory(flash::DRAWINGS_SIZE))?;
     let frame = options.common.frame();
 

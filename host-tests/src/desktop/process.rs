@@ -71,7 +71,7 @@ pub fn binary() -> &'static Path {
 }
 
 /// An address that no other arm of this computer's tests is likely to use.
-fn own_address() -> SocketAddr {
+pub fn own_address() -> SocketAddr {
     static NEXT: AtomicU8 = AtomicU8::new(1);
     let [_, .., high, low] = process::id().to_be_bytes();
     // 127.0 and 127.1 are what people and other programs use.
@@ -200,6 +200,24 @@ impl Desktop {
         wait_until(&format!("{count} clients to leave"), || {
             let log = self.log.lock().expect("the log's thread lives");
             log.iter().filter(|line| line.ends_with(" left")).count() >= count
+        });
+    }
+
+    /// The program that it is by now.
+    ///
+    /// # Panics
+    /// When it has ended.
+    pub fn program(&self) -> PathBuf {
+        fs::read_link(format!("/proc/{}/exe", self.child.id())).expect("the arm is running")
+    }
+
+    /// Waits until it has said a line with `text` for the `count`th time.
+    ///
+    /// # Panics
+    /// When it does not.
+    pub fn wait_to_say(&self, text: &str, count: usize) {
+        wait_until(&format!("{text:?}, {count} times"), || {
+            self.count(text) >= count
         });
     }
 

@@ -259,3 +259,31 @@ fn a_client_that_only_listens_hears_the_greeting_and_nothing_else() {
     drawer.wait_for_place("ok X:1100 Y:1000 Z:1000");
     assert!(listener.hears_nothing_for(Duration::from_millis(100)));
 }
+
+/// A page from anywhere may have the browser send a form to any port, and what is in it is up to the page.
+#[test]
+fn a_browser_gives_no_commands() {
+    let (_folder, arm) = arm();
+    for start in ["GET", "HEAD", "POST", "OPTIONS"] {
+        let mut browser = arm.client();
+        // However it is cut.
+        browser.send(&start[..2]);
+        assert!(browser.hears_nothing_for(Duration::from_millis(20)));
+        browser.send(format!(
+            "{} / HTTP/1.1\r\nHost: 127.0.0.1:1337\r\nOrigin: http://example.org\r\n\r\nM550 Pevil\r\n",
+            &start[2..]
+        ));
+        let reply = browser.reply();
+        assert!(reply.contains("this is HTTP"), "{start}: {reply:?}");
+        assert!(browser.is_closed(), "{start}");
+        assert_eq!(
+            arm.client().say("M550"),
+            "ok MACHINENAME:line-us",
+            "{start}"
+        );
+    }
+    // Later in a connection they are words like any other.
+    let mut client = arm.client();
+    assert_eq!(client.say("M114"), HOME);
+    assert_eq!(client.say("GET "), "error INFO:\"unknown command 'GET'\"");
+}

@@ -1,8 +1,8 @@
 //! A flash chip in a file: words of four bytes, pages of 4 kB, bits that only an erase sets.
 
 use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
-    check_write,
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+    check_erase, check_read, check_write,
 };
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -159,3 +159,5 @@ impl NorFlash for FileFlash {
         })
     }
 }
+
+impl MultiwriteNorFlash for FileFlash {}

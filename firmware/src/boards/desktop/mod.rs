@@ -2,6 +2,7 @@
 //! for flash, and a picture of what the servos did.
 
 pub mod air;
+pub mod bootloader;
 pub mod canvas;
 pub mod clock;
 pub mod draw;
@@ -11,6 +12,8 @@ pub mod imprint;
 pub mod net;
 pub mod pty;
 pub mod recorder;
+pub mod slots;
+pub mod trial;
 
 use crate::board::{Address, Vitals};
 use protocol_core::lineus::Identity;
@@ -21,7 +24,7 @@ pub const IDENTITY: Identity = Identity {
     mac: [0x02, 0x51, 0x75, 0x69, 0x6c, 0x6c],
 };
 
-/// What a desktop knows about itself.
+/// What a desktop that was started by hand knows about itself.
 pub const VITALS: Vitals = Vitals {
     free_memory,
     reset_reason: "program start",

@@ -3,10 +3,14 @@
 
 use crate::services::discovery::{GROUP, PORT};
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
-use edge_nal::{TcpAccept, TcpBind, UdpBind};
+use edge_nal::{AddrType, Dns, TcpAccept, TcpBind, TcpConnect, UdpBind};
 use edge_nal_std::{Stack, TcpAcceptor, TcpSocket, UdpSocket};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use socket2::{Domain, Protocol, SockRef, Socket, TcpKeepalive, Type};
 use std::io;
+use std::net::TcpStream;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A silent client is asked for a sign of life after 10 s, and given up after three questions more.
@@ -38,6 +42,40 @@ impl TcpAccept for Listener {
         options.set_tcp_nodelay(true)?;
         options.set_tcp_keepalive(&KEEP_ALIVE)?;
         Ok((peer, socket))
+    }
+}
+
+/// The way to other computers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outside;
+
+impl TcpConnect for Outside {
+    type Error = io::Error;
+    type Socket<'a> = TcpSocket;
+
+    async fn connect(&self, remote: SocketAddr) -> io::Result<TcpSocket> {
+        async_io::Async::<TcpStream>::connect(remote)
+            .await
+            .map(TcpSocket::new)
+    }
+}
+
+impl Dns for Outside {
+    type Error = io::Error;
+
+    /// The system's answer may take half a minute, and comes in a thread of its own: the arm goes on.
+    async fn get_host_by_name(&self, host: &str, kind: AddrType) -> io::Result<IpAddr> {
+        let answer = Arc::new(Signal::<CriticalSectionRawMutex, _>::new());
+        let (host, told) = (host.to_owned(), answer.clone());
+        std::thread::Builder::new().spawn(move || {
+            let ask = async { Stack::new().get_host_by_name(&host, kind).await };
+            told.signal(embassy_futures::block_on(ask));
+        })?;
+        answer.wait().await
+    }
+
+    async fn get_host_by_address(&self, _: IpAddr, _: &mut [u8]) -> io::Result<usize> {
+        Err(io::ErrorKind::Unsupported.into())
     }
 }
 

@@ -8,8 +8,8 @@ use crate::services::arm::Arm;
 use protocol_core::arm::Compensation;
 use protocol_core::machine::{ArmData, SetPoint, nib_of};
 use protocol_core::motion::{Micros, PulseWidth};
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
@@ -26,6 +26,8 @@ const FINISHED_AFTER: Micros = Micros::from_secs(1);
 const STRAIGHT: f64 = 0.05;
 /// Longest polyline; memory does not grow with a stroke either.
 const MAX_POINTS: usize = 1000;
+/// Bytes that no row of a trace has.
+const LONGEST_ROW: u64 = 256;
 /// Drawing units in a millimetre.
 const UNITS_PER_MM: f64 = 20.0;
 
@@ -36,6 +38,9 @@ pub struct Outputs {
     pub trace: Option<PathBuf>,
     /// SVG or PNG.
     pub picture: Option<PathBuf>,
+    /// The firmware was started again, by itself: the trace goes on, and an older picture stays until the arm
+    /// moves.
+    pub go_on: bool,
 }
 
 /// What the arm did in all.
@@ -156,6 +161,8 @@ struct Recording {
     /// What the plotter's outputs are said to be.
     switched: [bool; 3],
     last_moving: Micros,
+    /// The picture is an earlier one, and nothing has been drawn since.
+    keep_picture: bool,
     unsaved: bool,
     saved: Instant,
     /// That files cannot be written has been told.
@@ -168,14 +175,21 @@ impl Recording {
             io::Error::new(error.kind(), format!("{}: {error}", path.display()))
         };
         let trace = outputs.trace.map(|path| {
-            let mut file =
-                BufWriter::new(File::create(&path).map_err(|error| naming(&path, error))?);
-            writeln!(file, "time_us,x,y,z,shoulder_us,elbow_us,pen_us")?;
+            let opened = match outputs.go_on {
+                true => open_again(&path),
+                false => File::create(&path),
+            };
+            let mut file = BufWriter::new(opened.map_err(|error| naming(&path, error))?);
+            if file.get_ref().metadata()?.len() == 0 {
+                writeln!(file, "time_us,x,y,z,shoulder_us,elbow_us,pen_us")?;
+            }
             Ok::<_, io::Error>(file)
         });
         let picture = outputs.picture.map(|path| {
             let mut canvas = Canvas::for_file(&path).map_err(|error| naming(&path, error))?;
-            canvas.save(&path).map_err(|error| naming(&path, error))?;
+            if !outputs.go_on {
+                canvas.save(&path).map_err(|error| naming(&path, error))?;
+            }
             Ok::<_, io::Error>((path, canvas))
         });
         Ok(Self {
@@ -188,6 +202,7 @@ impl Recording {
             skipped: None,
             switched: [false; 3],
             last_moving: Micros::default(),
+            keep_picture: outputs.go_on,
             unsaved: false,
             saved: Instant::now(),
             told: false,
@@ -200,6 +215,7 @@ impl Recording {
             if set_point.moving {
                 let frame = time - previous.unwrap_or(time);
                 self.totals.moving += Duration::from_micros(frame.get());
+                self.keep_picture = false;
             }
             let written = if set_point.moving || previous.is_none() {
                 self.moving(time, &set_point, &compensation)
@@ -312,7 +328,9 @@ impl Recording {
         if let Some(trace) = &mut self.trace {
             trace.flush()?;
         }
-        if let Some((path, canvas)) = &mut self.picture {
+        if let Some((path, canvas)) = &mut self.picture
+            && !self.keep_picture
+        {
             self.pen.flush(canvas)?;
             canvas.save(path)?;
         }
@@ -320,6 +338,20 @@ impl Recording {
         self.told = false;
         Ok(())
     }
+}
+
+/// A trace to go on with, without a last row that is torn.
+fn open_again(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).append(true).create(true);
+    let mut file = options.open(path)?;
+    let length = file.metadata()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST_ROW)))?;
+    let mut end = Vec::new();
+    file.read_to_end(&mut end)?;
+    let torn = end.iter().rev().take_while(|byte| **byte != b'\n').count();
+    file.set_len(length - torn as u64)?;
+    Ok(file)
 }
 
 /// The nib on the picture: collects points into polylines.
