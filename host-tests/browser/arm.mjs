@@ -11,7 +11,7 @@ import { launch } from './browser.mjs';
 export const PHONE = { width: 390, height: 844 }, DESK = { width: 1280, height: 800 };
 
 /** The program, as `cargo xtask test` names it. */
-const program = process.env.QUILL_DESKTOP ?? new URL('../../target/debug/desktop', import.meta.url).pathname;
+export const program = process.env.QUILL_DESKTOP ?? new URL('../../target/debug/desktop', import.meta.url).pathname;
 
 /** A port that nobody listens at. */
 function freePort() {
@@ -22,9 +22,10 @@ function freePort() {
 }
 
 export class Arm {
-  /** Starts an arm that is new, with the networks of `air` around it, or in the computer's own. */
-  static async start({ speed = 'max', air } = {}) {
+  /** Starts an arm that is new, with the networks of `air` around it, or in the computer's own; `slots`: with place for other firmware. */
+  static async start({ speed = 'max', air, slots = false } = {}) {
     const arm = new Arm();
+    arm.slots = slots;
     arm.folder = mkdtempSync(join(tmpdir(), 'quill-'));
     arm.port = await freePort();
     arm.lineUs = await freePort();
@@ -41,6 +42,7 @@ export class Arm {
       // The pen lifts when a test lifts it.
       '--lift-after', '3600'];
     if (this.air) options.push('--air', this.air);
+    if (this.slots) options.push('--firmware', join(this.folder, 'firmware'));
     this.process = spawn(program, options, { stdio: ['ignore', 'pipe', 'inherit'] });
     const ended = new Promise((_, failed) => {
       this.process.once('error', failed);
