@@ -10,7 +10,18 @@ use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+
+/// A process that ends with its test.
+struct Killed(Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
 
 /// The slot that starts.
 fn chosen(bench: &Bench) -> Slot {
@@ -90,7 +101,7 @@ fn a_firmware_that_hangs_three_times_is_gone_without_a_hand() {
     assert_eq!(full, ErrorKind::WouldBlock);
     there.set_nonblocking(false).expect("sockets have options");
     let address = own_address();
-    let mut child = Command::new(binary())
+    let child = Command::new(binary())
         .args(["--line-us", &address.to_string(), "--web", "none"])
         // Its patience is shorter then: a second.
         .args(["--speed", "20", "--firmware"])
@@ -102,9 +113,10 @@ fn a_firmware_that_hangs_three_times_is_gone_without_a_hand() {
         .stdout(Stdio::from(OwnedFd::from(there)))
         .spawn()
         .expect("the desktop arm's program can be started");
+    let arm = Killed(child);
     // The second start and the third; the fourth finds that it has to go back, and hangs as it says so.
     wait_until("the end of the trial", || chosen(&bench) == Slot::First);
-    let environment = fs::read(format!("/proc/{}/environ", child.id()));
+    let environment = fs::read(format!("/proc/{}/environ", arm.0.id()));
     let environment = environment.expect("the arm is running");
     let reset = format!("QUILL_RESET={}", Reset::Watchdog.name());
     assert!(
@@ -123,10 +135,6 @@ fn a_firmware_that_hangs_three_times_is_gone_without_a_hand() {
     let mut client = Client::connect(address);
     client.reply();
     assert_eq!(told(&mut client), back());
-    child
-        .kill()
-        .and_then(|()| child.wait())
-        .expect("it was running");
 }
 
 #[test]

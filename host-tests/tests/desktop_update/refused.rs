@@ -7,6 +7,9 @@ use host_tests::desktop::{Desktop, binary};
 use std::fs;
 use std::process::Command;
 
+/// What would end an arm later, with another error.
+const UNABLE: [&str; 2] = ["--air", "/nowhere/at/all"];
+
 #[test]
 fn a_refusal_leaves_everything_as_it_is() {
     let bench = Bench::new();
@@ -60,6 +63,7 @@ fn whoever_is_elsewhere_does_not_reach_an_arm_that_believes_the_published_key() 
                 .current_dir(bench.path())
                 .args(["--firmware", "firmware", option, address])
                 .args(rest)
+                .args(UNABLE)
                 .output()
                 .expect("the desktop arm's program can be started");
             assert_eq!(run.status.code(), Some(1), "{option} {address}");
@@ -80,6 +84,7 @@ fn a_place_that_is_something_else_stays_as_it_is() {
     let run = Command::new(binary())
         .current_dir(bench.path())
         .args(["--firmware", "firmware", "--line-us", "127.0.0.1:0"])
+        .args(UNABLE)
         .output()
         .expect("the desktop arm's program can be started");
     assert_eq!(run.status.code(), Some(1));
