@@ -2,10 +2,10 @@
 //! and is back if it does not. The emulator's driver is bootloader and watchdog.
 
 use host_tests::desktop::{Client, Web};
+use host_tests::web_server::serve;
 use protocol_core::update::Version;
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
@@ -23,35 +23,6 @@ fn firmware(variable: &str) -> PathBuf {
     PathBuf::from(file.unwrap_or_else(|| {
         panic!("{variable} names a firmware: run these tests with `cargo xtask test`")
     }))
-}
-
-/// Serves the files of a folder, as any web server does; gives its port.
-fn serve(folder: PathBuf) -> u16 {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = listener.local_addr().unwrap().port();
-    thread::spawn(move || {
-        for stream in listener.incoming() {
-            let mut stream = stream.unwrap();
-            let mut lines = BufReader::new(stream.try_clone().unwrap()).lines();
-            let request = lines.next().unwrap().unwrap();
-            while lines
-                .next()
-                .is_some_and(|line| line.is_ok_and(|line| !line.is_empty()))
-            {}
-            let name = request.split(' ').nth(1).unwrap().trim_start_matches('/');
-            let head = |status: &str, length: usize| {
-                format!("HTTP/1.0 {status}\r\nServer: test\r\nContent-Length: {length}\r\n\r\n")
-            };
-            // The machine may have heard enough.
-            let _ = match fs::read(folder.join(name)) {
-                Ok(content) => stream
-                    .write_all(head("200 OK", content.len()).as_bytes())
-                    .and_then(|()| stream.write_all(&content)),
-                Err(_) => stream.write_all(head("404 Not Found", 0).as_bytes()),
-            };
-        }
-    });
-    port
 }
 
 /// A machine with its disk, and a server with a newer firmware.
@@ -73,7 +44,7 @@ impl Bench {
         Self {
             address: free_address().unwrap(),
             web: free_address().unwrap(),
-            port: serve(served),
+            port: serve(move |name| fs::read(served.join(name)).ok()),
             folder,
         }
     }

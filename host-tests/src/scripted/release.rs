@@ -2,9 +2,8 @@
 
 use super::server::{Answer, HOST, PORT, Server};
 use super::slots::BOARD;
-use ed25519_dalek::Signer;
-pub use ed25519_dalek::SigningKey;
-use sha2::{Digest, Sha256};
+use crate::manifest::signed_part;
+pub use crate::manifest::{SigningKey, development_key, sign};
 
 /// Path of the manifest.
 pub const MANIFEST: &str = "/quill/scripted.txt";
@@ -14,19 +13,6 @@ pub const IMAGE: &str = "/quill/new.bin";
 /// Of the manifest.
 pub fn address() -> String {
     format!("http://{HOST}:{PORT}{MANIFEST}")
-}
-
-/// As lower-case hexadecimal digits.
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// The key of development builds.
-pub fn development_key() -> SigningKey {
-    let digits = include_str!("../../../firmware/keys/development.key").trim();
-    let byte = |at| u8::from_str_radix(&digits[at..at + 2], 16).unwrap();
-    let bytes: Vec<u8> = (0..digits.len()).step_by(2).map(byte).collect();
-    SigningKey::from_bytes(&bytes.try_into().unwrap())
 }
 
 /// What a manifest says, before it is signed.
@@ -62,13 +48,7 @@ impl Release {
 
     /// The manifest before its last line.
     pub fn signed_part(&self) -> String {
-        format!(
-            "Quill update 1\nboard: {}\nversion: {}\nsize: {}\nsha256: {}\nimage: new.bin\n",
-            self.board,
-            self.version,
-            self.image.len(),
-            hex(&Sha256::digest(&self.image)),
-        )
+        signed_part(&self.board, &self.version, &self.image, "new.bin")
     }
 
     /// The whole manifest, as development builds believe it.
@@ -88,10 +68,4 @@ impl Release {
         server.put(MANIFEST, Answer::file(self.manifest().as_bytes()));
         server.put(IMAGE, Answer::file(&self.image));
     }
-}
-
-/// A manifest of these lines.
-pub fn sign(text: &str, key: &SigningKey) -> String {
-    let signature = key.sign(text.as_bytes());
-    format!("{text}signature: {}\n", hex(&signature.to_bytes()))
 }

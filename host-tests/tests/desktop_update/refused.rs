@@ -2,8 +2,8 @@
 
 use super::{Bench, READY, ask, field, told};
 use crate::release::Release;
-use ed25519_dalek::SigningKey;
 use host_tests::desktop::{Desktop, binary};
+use host_tests::manifest::SigningKey;
 use std::fs;
 use std::process::Command;
 

@@ -1,13 +1,10 @@
 //! A signed image, and a web server that has it.
 
-use ed25519_dalek::{Signer, SigningKey};
 use firmware::boards::desktop::slots;
 use host_tests::desktop::binary;
-use sha2::{Digest, Sha256};
+use host_tests::manifest::{SigningKey, development_key, sign, signed_part};
+use host_tests::web_server::serve;
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpListener, TcpStream};
-use std::thread;
 
 /// The version of every image here: newer than anything that runs.
 pub const NEW: &str = "9.0.0";
@@ -42,50 +39,16 @@ impl Release {
         Self::of(format!("#!/bin/sh\nexec '{program}' \"$@\" {arguments}\n"))
     }
 
-    fn manifest(&self) -> String {
-        let signed = format!(
-            "Quill update 1\nboard: {}\nversion: {NEW}\nsize: {}\nsha256: {}\nimage: image\n",
-            self.board,
-            self.image.len(),
-            hex(&Sha256::digest(&self.image)),
-        );
-        let signature = self.key.sign(signed.as_bytes());
-        format!("{signed}signature: {}\n", hex(&signature.to_bytes()))
-    }
-
     /// Serves it as long as the tests run, and gives the manifest's address.
     pub fn serve(self) -> String {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let port = listener.local_addr().unwrap().port();
-        thread::spawn(move || {
-            for stream in listener.incoming() {
-                // The arm may have heard enough.
-                let _ = stream.and_then(|stream| self.answer(stream));
-            }
+        let signed = signed_part(&self.board, NEW, &self.image, "image");
+        let manifest = sign(&signed, &self.key);
+        let port = serve(move |name| match name {
+            "manifest" => Some(manifest.clone().into()),
+            _ => Some(self.image.clone()),
         });
         // A name, so that one is looked up.
         format!("http://localhost:{port}/manifest")
-    }
-
-    fn answer(&self, mut stream: TcpStream) -> std::io::Result<()> {
-        let mut lines = BufReader::new(stream.try_clone()?).lines();
-        let request = lines.next().transpose()?.unwrap_or_default();
-        while lines
-            .next()
-            .transpose()?
-            .is_some_and(|line| !line.is_empty())
-        {}
-        let manifest = self.manifest();
-        let content = match request.split(' ').nth(1) {
-            Some("/manifest") => manifest.as_bytes(),
-            _ => &self.image,
-        };
-        write!(
-            stream,
-            "HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n",
-            content.len()
-        )?;
-        stream.write_all(content)
     }
 }
 
@@ -105,13 +68,4 @@ fn end_of_segments(file: &[u8]) -> Option<usize> {
         Some(number(header + 0x08, 8)? + number(header + 0x20, 8)?)
     });
     ends.collect::<Option<Vec<_>>>()?.into_iter().max()
-}
-
-fn development_key() -> SigningKey {
-    let digits = include_str!("../../../firmware/keys/development.key").trim();
-    SigningKey::from_bytes(&protocol_core::update::hexadecimal(digits.as_bytes()).unwrap())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
