@@ -2,6 +2,7 @@
 //! (`docs/update.md`): the real program, with real sockets, files and restarts.
 
 mod back;
+mod drawing;
 mod refused;
 mod release;
 

@@ -39,10 +39,19 @@ impl Release {
         Self::of(format!("#!/bin/sh\nexec '{program}' \"$@\" {arguments}\n"))
     }
 
+    fn manifest(&self) -> String {
+        let signed = signed_part(&self.board, NEW, &self.image, "image");
+        sign(&signed, &self.key)
+    }
+
+    /// The file for a page.
+    pub fn file(&self) -> Vec<u8> {
+        [self.manifest().as_bytes(), &self.image].concat()
+    }
+
     /// Serves it as long as the tests run, and gives the manifest's address.
     pub fn serve(self) -> String {
-        let signed = signed_part(&self.board, NEW, &self.image, "image");
-        let manifest = sign(&signed, &self.key);
+        let manifest = self.manifest();
         let port = serve(move |name| match name {
             "manifest" => Some(manifest.clone().into()),
             _ => Some(self.image.clone()),
