@@ -149,6 +149,7 @@ fn an_image_that_is_no_program_is_passed_over_and_given_up() {
     assert_eq!(arm.count("firmware first of "), 2);
     assert_eq!(chosen(&bench), Slot::First);
     assert!(!trap.exists());
+    assert_eq!(told(&mut arm.client()), back());
     arm.cut_power();
     let arm = bench.start(&[]);
     assert!(!arm.said("second"));

@@ -205,7 +205,7 @@ impl BootChoice {
         };
         let give_up = mark(at + STATE_AT, INVALID.to_le_bytes());
         if self.slot() != running {
-            return Start::Count(give_up, Standing::Settled);
+            return Start::Count(give_up, self.without(at).settled());
         }
         let starts = marks.into_iter().take(STARTS.into());
         let before = starts.filter(|mark| *mark != 0xff).count() as u8;

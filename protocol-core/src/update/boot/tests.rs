@@ -206,11 +206,13 @@ fn a_choice_that_the_bootloader_does_not_follow_is_taken_back() {
     let mut flash = Flash::flashed();
     flash.switch_to(Slot::Second);
     // The image is damaged, and the bootloader takes the other one.
-    let Start::Count(step, Standing::Settled) = flash.choice().start(Slot::First) else {
-        panic!("{:?}", flash.choice().start(Slot::First));
-    };
-    flash.perform(&step);
     let back = Standing::Back { from: NEW };
+    let start = flash.choice().start(Slot::First);
+    let Start::Count(step, standing) = start else {
+        panic!("{start:?}");
+    };
+    assert_eq!(standing, back);
+    flash.perform(&step);
     assert_eq!(flash.start(), (Slot::First, back));
 }
 
