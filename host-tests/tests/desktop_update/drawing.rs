@@ -6,14 +6,12 @@ use host_tests::desktop::{Desktop, Web, wait_until};
 use std::thread;
 
 const DRAWING: &str = "G01 X1200 Y0\nG01 Z0\nG01 X1500\nG01 X1200\nG01 Z1000\n";
-/// A minute, which is how long an update waits for the arm, takes two seconds.
-const SPEED: &str = "30";
 
-fn start(bench: &Bench) -> Desktop {
+fn start(bench: &Bench, speed: &str) -> Desktop {
     let place = bench.slot("").display().to_string();
     let arguments = [
         "--speed",
-        SPEED,
+        speed,
         "--firmware",
         &place,
         "--lift-after",
@@ -33,7 +31,8 @@ fn hand_over(web: Web, file: &[u8]) -> (u16, String) {
 #[test]
 fn a_drawing_that_pauses_is_not_lost() {
     let bench = Bench::new();
-    let arm = start(&bench);
+    // A minute, which is how long an update waits for the arm, takes two seconds.
+    let arm = start(&bench, "30");
     let web = arm.web();
     web.done("/api/job", DRAWING);
     web.done("/api/job/pause", "{\"now\":true}");
@@ -52,7 +51,7 @@ fn a_drawing_that_pauses_is_not_lost() {
 #[test]
 fn no_drawing_begins_that_a_restart_would_end() {
     let bench = Bench::new();
-    let arm = start(&bench);
+    let arm = start(&bench, "1");
     let web = arm.web();
     let mut client = arm.client();
     assert_eq!(client.say("G01 X1000 Y500 Z0"), "ok X:1000 Y:500 Z:0");
