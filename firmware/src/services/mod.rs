@@ -15,6 +15,7 @@ pub mod serial;
 pub mod storage;
 pub mod update;
 pub mod web;
+mod window;
 
 use crate::board::Vitals;
 use arm::Arm;

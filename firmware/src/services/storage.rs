@@ -9,14 +9,13 @@ mod view;
 
 pub use memory::Memory;
 
+use super::window::{Ticket, Turn, Window};
 use crate::log::warning;
 use core::borrow::BorrowMut;
 use core::cell::{Cell, RefCell};
 use core::fmt;
 use embassy_sync::blocking_mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::mutex::{Mutex, MutexGuard};
-use embassy_sync::signal::Signal;
 use embedded_storage_async::nor_flash::NorFlash;
 use protocol_core::settings::Settings;
 
@@ -71,19 +70,13 @@ impl fmt::Display for MemoryHealth {
     }
 }
 
-/// Counts stores, so that nobody takes an earlier one's outcome for his own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Ticket(u32);
-
 /// The way of the other services to the memory.
 ///
 /// Settings are a kilobyte: there is one place for those that are being stored, here, instead of one in
 /// each task that may want to.
 pub struct Store {
-    turn: Mutex<CriticalSectionRawMutex, Ticket>,
+    window: Window<Result<(), StoreError>>,
     proposal: blocking_mutex::Mutex<CriticalSectionRawMutex, RefCell<Option<Settings>>>,
-    request: Signal<CriticalSectionRawMutex, Ticket>,
-    outcome: Signal<CriticalSectionRawMutex, (Ticket, Result<(), StoreError>)>,
     health: blocking_mutex::Mutex<CriticalSectionRawMutex, Cell<MemoryHealth>>,
 }
 
@@ -97,10 +90,8 @@ impl Store {
     /// With nothing to do.
     pub const fn new() -> Self {
         Self {
-            turn: Mutex::new(Ticket(0)),
+            window: Window::new(),
             proposal: blocking_mutex::Mutex::new(RefCell::new(None)),
-            request: Signal::new(),
-            outcome: Signal::new(),
             health: blocking_mutex::Mutex::new(Cell::new(MemoryHealth::Missing)),
         }
     }
@@ -122,8 +113,8 @@ impl Store {
     }
 
     /// Waits until nobody else stores.
-    pub(super) async fn turn(&self) -> MutexGuard<'_, CriticalSectionRawMutex, Ticket> {
-        self.turn.lock().await
+    pub(super) async fn turn(&self) -> Turn<'_> {
+        self.window.turn().await
     }
 
     /// Something short with what is to be stored; only for whose turn it is.
@@ -133,22 +124,15 @@ impl Store {
 
     /// Has the proposal stored.
     pub(super) async fn perform(&self, turn: &mut Ticket) -> Result<(), StoreError> {
-        *turn = Ticket(turn.0.wrapping_add(1));
-        self.request.signal(*turn);
-        loop {
-            let (ticket, outcome) = self.outcome.wait().await;
-            if ticket == *turn {
-                return outcome;
-            }
-        }
+        self.window.ask(turn).await
     }
 
     /// The storage service of a board without memory: nothing is stored, and everybody is told so.
     pub async fn refuse(&self) -> ! {
         self.tell(MemoryHealth::Missing);
         loop {
-            let ticket = self.request.wait().await;
-            self.outcome.signal((ticket, Err(StoreError)));
+            let ticket = self.window.next().await;
+            self.window.tell(ticket, Err(StoreError));
         }
     }
 
@@ -159,7 +143,7 @@ impl Store {
         let memory = memory.borrow_mut();
         self.tell(memory.health());
         loop {
-            let ticket = self.request.wait().await;
+            let ticket = self.window.next().await;
             self.propose(|proposal| {
                 if let Some(settings) = proposal {
                     memory.stage(settings);
@@ -170,7 +154,7 @@ impl Store {
             if outcome.is_err() {
                 warning!("the settings could not be stored");
             }
-            self.outcome.signal((ticket, outcome));
+            self.window.tell(ticket, outcome);
         }
     }
 

@@ -12,6 +12,7 @@ pub use album::{Album, AlbumError, MAX_SHEETS};
 pub use reader::Reader;
 
 use super::arm::Arm;
+use super::window::{Ticket, Window};
 use crate::log::warning;
 use album::{Catalogue, contents};
 use core::borrow::BorrowMut;
@@ -19,8 +20,6 @@ use core::cell::RefCell;
 use core::fmt;
 use embassy_sync::blocking_mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::mutex::Mutex;
-use embassy_sync::signal::Signal;
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 use protocol_core::drawings::{Contents, FIRST_LINE, MAX_DRAWINGS, Slot, Space};
@@ -71,10 +70,6 @@ pub enum Recorded {
     AfterRest,
 }
 
-/// Counts what is asked for, so that nobody takes an earlier outcome for his own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Ticket(u32);
-
 /// What is asked for.
 #[derive(Clone, Copy, Debug)]
 enum Job {
@@ -113,10 +108,8 @@ struct Desk {
 
 /// The way of the other services to the drawings.
 pub struct Drawings {
-    turn: Mutex<CriticalSectionRawMutex, Ticket>,
+    window: Window<Result<usize, AlbumError>>,
     desk: blocking_mutex::Mutex<CriticalSectionRawMutex, RefCell<Desk>>,
-    request: Signal<CriticalSectionRawMutex, Ticket>,
-    outcome: Signal<CriticalSectionRawMutex, (Ticket, Result<usize, AlbumError>)>,
 }
 
 impl Default for Drawings {
@@ -129,7 +122,7 @@ impl Drawings {
     /// With nothing known.
     pub const fn new() -> Self {
         Self {
-            turn: Mutex::new(Ticket(0)),
+            window: Window::new(),
             desk: blocking_mutex::Mutex::new(RefCell::new(Desk {
                 job: Job::Abandon,
                 recording: None,
@@ -138,8 +131,6 @@ impl Drawings {
                 stored: [None; MAX_DRAWINGS as usize],
                 space: Space { total: 0, used: 0 },
             })),
-            request: Signal::new(),
-            outcome: Signal::new(),
         }
     }
 
@@ -283,7 +274,7 @@ impl Drawings {
         offset: u32,
         bytes: &mut [u8],
     ) -> Result<usize, AlbumError> {
-        let mut turn = self.turn.lock().await;
+        let mut turn = self.window.turn().await;
         let job = Job::Read {
             slot,
             sequence,
@@ -299,20 +290,13 @@ impl Drawings {
     }
 
     async fn perform(&self, job: Job) -> Result<usize, AlbumError> {
-        let mut turn = self.turn.lock().await;
+        let mut turn = self.window.turn().await;
         self.perform_in(&mut turn, job).await
     }
 
     async fn perform_in(&self, turn: &mut Ticket, job: Job) -> Result<usize, AlbumError> {
-        *turn = Ticket(turn.0.wrapping_add(1));
         self.desk(|desk| desk.job = job);
-        self.request.signal(*turn);
-        loop {
-            let (ticket, outcome) = self.outcome.wait().await;
-            if ticket == *turn {
-                return outcome;
-            }
-        }
+        self.window.ask(turn).await
     }
 
     fn desk<T>(&self, f: impl FnOnce(&mut Desk) -> T) -> T {
@@ -322,8 +306,8 @@ impl Drawings {
     /// The service of a board without memory for drawings: everybody is told so.
     pub async fn refuse(&self) -> ! {
         loop {
-            let ticket = self.request.wait().await;
-            self.outcome.signal((ticket, Err(AlbumError::Missing)));
+            let ticket = self.window.next().await;
+            self.window.tell(ticket, Err(AlbumError::Missing));
         }
     }
 
@@ -334,7 +318,7 @@ impl Drawings {
         let mut bytes = [0; COLLECTED];
         self.tell(album);
         loop {
-            let ticket = self.request.wait().await;
+            let ticket = self.window.next().await;
             let job = self.desk(|desk| desk.job);
             let outcome = self.work(job, album, &mut bytes).await;
             if !matches!(job, Job::Read { .. }) {
@@ -343,7 +327,7 @@ impl Drawings {
             if let Err(error @ (AlbumError::Worn | AlbumError::Damaged)) = outcome {
                 warning!("drawings: {}", error.text());
             }
-            self.outcome.signal((ticket, outcome));
+            self.window.tell(ticket, outcome);
         }
     }
 
