@@ -436,11 +436,7 @@ impl Machine {
         self.lift_at = None;
         if self.position.pen_is_down() {
             self.clock = now;
-            let up = Position {
-                z: PEN_UP,
-                ..self.position
-            };
-            self.start(Manner::Straight, &Target::at(up));
+            self.start(Manner::Straight, &Target::PEN_UP);
         }
     }
 

@@ -16,7 +16,6 @@ use embedded_io_async::Read;
 use protocol_core::drawings::{Replay, Slot};
 use protocol_core::lineus::{Reply, Request, Session};
 use protocol_core::machine::{Client, Errand, Manner, Target};
-use protocol_core::motion::{PEN_UP, WideCoordinate};
 
 /// Bytes taken from a source at a time.
 const CHUNK: usize = 256;
@@ -296,7 +295,7 @@ pub async fn draw<S: Read>(
 
 fn with_pen_up(errand: Errand) -> Errand {
     let lifted = |target| Target {
-        z: Some(WideCoordinate::from_bits(PEN_UP.bits().into())),
+        z: Target::PEN_UP.z,
         ..target
     };
     match errand {
@@ -308,13 +307,9 @@ fn with_pen_up(errand: Errand) -> Errand {
 
 /// Ends what `client` draws: the move under way is the last one, and then the pen rises.
 pub async fn lift(client: Client, house: &House) {
-    let up = Target {
-        z: Some(WideCoordinate::from_bits(PEN_UP.bits().into())),
-        ..Target::default()
-    };
     // It takes the place of the move that waits.
     house
         .arm
-        .errand(client, &Errand::Move(Manner::Straight, up))
+        .errand(client, &Errand::Move(Manner::Straight, Target::PEN_UP))
         .await;
 }

@@ -2,7 +2,7 @@
 
 #[cfg(doc)]
 use super::Machine;
-use crate::motion::{HOME, Micros, Position, WideCoordinate};
+use crate::motion::{HOME, Micros, PEN_UP, Position, WideCoordinate};
 
 /// Clients that may be connected at once; the next one is told so and closed.
 pub const MAX_CLIENTS: usize = 4;
@@ -66,6 +66,13 @@ pub struct Target {
 impl Target {
     /// Home (`spec 1.0.4a, G28`).
     pub const HOME: Self = Self::at(HOME);
+
+    /// Where the arm is, with the pen up.
+    pub const PEN_UP: Self = Self {
+        x: None,
+        y: None,
+        z: Some(WideCoordinate::from_bits(PEN_UP.bits() as i64)),
+    };
 
     /// A place inside the arm's reach.
     pub const fn at(position: Position) -> Self {

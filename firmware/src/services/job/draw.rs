@@ -182,11 +182,7 @@ impl Drawing<'_> {
     /// Lifts the pen where it is.
     async fn lift(&mut self) {
         if self.at.pen_is_down() && !self.away {
-            let up = Target {
-                z: Some(PEN_UP.into()),
-                ..Target::default()
-            };
-            self.go(up).await;
+            self.go(Target::PEN_UP).await;
         }
         self.away = true;
     }
@@ -197,16 +193,12 @@ impl Drawing<'_> {
             return;
         }
         let Position { x, y, z } = self.at;
-        let up = Target {
-            z: Some(PEN_UP.into()),
-            ..Target::default()
-        };
         let there = Target {
             x: Some(x.into()),
             y: Some(y.into()),
-            z: Some(PEN_UP.into()),
+            ..Target::PEN_UP
         };
-        self.go(up).await;
+        self.go(Target::PEN_UP).await;
         self.go(there).await;
         if z != PEN_UP {
             self.go(Target {

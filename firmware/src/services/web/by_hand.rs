@@ -8,7 +8,7 @@ use crate::services::job::State;
 use embedded_io_async::{Read, Write};
 use protocol_core::lineus::STOPPED;
 use protocol_core::machine::{Client, Errand, Limited, Manner, Report, Target};
-use protocol_core::motion::{Coordinate, MAX_COORDINATE, PEN_UP, Position, WideCoordinate};
+use protocol_core::motion::{Coordinate, MAX_COORDINATE, Position, WideCoordinate};
 use serde::{Deserialize, Serialize};
 
 /// Longest relative move of X and Y, in units.
@@ -92,12 +92,8 @@ pub async fn home<S: Read + Write>(
     client: Client,
     house: &House,
 ) -> Result<(), Trouble> {
-    let up = Target {
-        z: Some(PEN_UP.into()),
-        ..Target::default()
-    };
     free(house)?;
-    errand(up, client, house).await?;
+    errand(Target::PEN_UP, client, house).await?;
     travel(exchange, Target::HOME, client, house).await
 }
 
