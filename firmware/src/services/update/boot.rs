@@ -3,7 +3,7 @@
 use crate::board::FirmwareSlots;
 use embedded_storage_async::nor_flash::{MultiwriteNorFlash, NorFlash, ReadNorFlash};
 use protocol_core::update::{
-    BootChoice, ENTRY, PAGE, Rejection, Slot, Standing, Start, Step, Version,
+    BootChoice, ENTRY, PAGE, Rejection, STARTS, Slot, Standing, Start, Step, Version,
 };
 
 /// Memory of the words that flashes are made of.
@@ -37,18 +37,8 @@ pub async fn at_start<F: MultiwriteNorFlash>(flash: &mut F, running: Slot) -> Op
         }
         Start::GoBack(step) => match perform(flash, &step).await {
             Ok(()) => None,
-            Err(_) => Some(choice_standing(&choice, running)),
+            Err(_) => Some(Standing::Trial { starts: STARTS }),
         },
-    }
-}
-
-/// Of a choice that cannot be taken back.
-fn choice_standing(choice: &BootChoice, running: Slot) -> Standing {
-    match choice.slot() == running && choice.is_on_trial() {
-        true => Standing::Trial {
-            starts: protocol_core::update::STARTS,
-        },
-        false => Standing::Settled,
     }
 }
 
