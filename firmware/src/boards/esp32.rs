@@ -5,6 +5,7 @@ use super::esp::data::{Board, LightPort, SerialPort, ServoPort};
 /// The board.
 pub const BOARD: Board = Board {
     name: "ESP32-DevKitC",
+    update_name: "esp32",
     // Analogue servos. Digital ones take up to 333.
     frame_rate_hz: 50,
     // Pulses at 0 and at 180 degrees, in microseconds.

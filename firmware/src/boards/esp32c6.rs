@@ -5,6 +5,7 @@ use super::esp::data::{Board, ColourOrder, LightPort, SerialPort, ServoPort};
 /// The board.
 pub const BOARD: Board = Board {
     name: "ESP32-C6-DevKitC-1",
+    update_name: "esp32c6",
     // Analogue servos. Digital ones take up to 333.
     frame_rate_hz: 50,
     // Pulses at 0 and at 180 degrees, in microseconds.

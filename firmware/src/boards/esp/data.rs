@@ -15,23 +15,12 @@ pub use crate::boards::esp32c6::BOARD;
 #[cfg(feature = "esp32s3")]
 pub use crate::boards::esp32s3::BOARD;
 
-/// What manifests of updates call this board: the feature that it is built with.
-#[cfg(feature = "esp32")]
-pub const UPDATE_NAME: &str = "esp32";
-/// What manifests of updates call this board: the feature that it is built with.
-#[cfg(feature = "esp32c3")]
-pub const UPDATE_NAME: &str = "esp32c3";
-/// What manifests of updates call this board: the feature that it is built with.
-#[cfg(feature = "esp32c6")]
-pub const UPDATE_NAME: &str = "esp32c6";
-/// What manifests of updates call this board: the feature that it is built with.
-#[cfg(feature = "esp32s3")]
-pub const UPDATE_NAME: &str = "esp32s3";
-
 /// Everything that differs from one arm to the next.
 pub struct Board {
     /// Name for people.
     pub name: &'static str,
+    /// What manifests of updates call it: the feature that it is built with.
+    pub update_name: &'static str,
     /// Servo frames a second: 50 for analogue servos, up to 333 for digital ones.
     pub frame_rate_hz: u32,
     /// The servo that carries the upper link.

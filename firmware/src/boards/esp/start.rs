@@ -1,7 +1,7 @@
 //! From reset to a board with everything in its place.
 
 use super::Button;
-use super::data::{BOARD, UPDATE_NAME};
+use super::data::BOARD;
 use super::flash::{self, Chip, FlashPartition};
 use super::inputs::Inputs;
 use super::interface::Interfaces;
@@ -155,7 +155,7 @@ fn firmware_slots(
         software_reset();
     };
     let slots = PartitionedSlots {
-        board: UPDATE_NAME,
+        board: BOARD.update_name,
         running,
         other: match running {
             Slot::First => second,
