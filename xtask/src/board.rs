@@ -75,7 +75,10 @@ impl Board {
 
     /// Builds one of the firmware's binaries, and gives the file.
     pub fn build(self, binary: &str, extra_features: &[&str], setup: bool) -> Result<PathBuf> {
-        let mut cargo = self.cargo("build", extra_features, setup)?;
+        self.built(binary, self.cargo("build", extra_features, setup)?)
+    }
+
+    fn built(self, binary: &str, mut cargo: Command) -> Result<PathBuf> {
         run(cargo.args(["--bin", binary]))?;
         let mut file = target_dir();
         file.extend(self.target());
@@ -90,10 +93,7 @@ impl Board {
     pub fn build_version(self, version: &str, setup: bool) -> Result<PathBuf> {
         let mut cargo = self.cargo("build", &[], setup)?;
         cargo.env("QUILL_VERSION", version);
-        run(cargo.args(["--bin", self.binary()]))?;
-        let mut file = target_dir();
-        file.extend(self.target());
-        file.extend([self.profile(), self.binary()]);
+        let file = self.built(self.binary(), cargo)?;
         let copy = file.with_file_name(format!("{}-{version}", self.binary()));
         std::fs::copy(&file, &copy).with_context(|| file.display().to_string())?;
         Ok(copy)

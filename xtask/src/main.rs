@@ -9,6 +9,7 @@ mod test;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use protocol_core::update::Version;
+use std::fs;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
@@ -194,7 +195,11 @@ fn make_release(what: Release, setup: bool) -> Result<()> {
             key,
         }) => {
             let version = Version::parse(&version).context("a version is three numbers")?;
-            let text = release::manifest(board.manifest_name(), version, &image, &key_of(key)?)?;
+            let content = fs::read(&image).with_context(|| image.display().to_string())?;
+            let name = image.file_name().and_then(|name| name.to_str());
+            let name = name.unwrap_or_default();
+            let key = key_of(key)?;
+            let text = release::manifest(board.manifest_name(), version, name, &content, &key)?;
             print!("{text}");
         }
         None => {

@@ -52,17 +52,20 @@ pub fn read_key(file: &Path) -> Result<SigningKey> {
     Ok(SigningKey::from_bytes(&secret))
 }
 
-/// The manifest of an image that lies beside it.
-pub fn manifest(board: &str, version: Version, image: &Path, key: &SigningKey) -> Result<String> {
-    let content = fs::read(image).with_context(|| image.display().to_string())?;
-    let name = image
-        .file_name()
-        .and_then(|name| ImageName::new(name.to_str()?))
+/// The manifest of an image that will lie beside it under that name.
+pub fn manifest(
+    board: &str,
+    version: Version,
+    name: &str,
+    image: &[u8],
+    key: &SigningKey,
+) -> Result<String> {
+    let name = ImageName::new(name)
         .context("an image's name is letters, digits and . _ - +, 64 at most")?;
     let signed = format!(
         "Quill update 1\nboard: {board}\nversion: {version}\nsize: {}\nsha256: {}\nimage: {}\n",
-        content.len(),
-        hex(&Sha256::digest(&content)),
+        image.len(),
+        hex(&Sha256::digest(image)),
         name.as_str(),
     );
     let signature = key.sign(signed.as_bytes());
@@ -94,28 +97,28 @@ pub fn release(
     key: &SigningKey,
     folder: &Path,
 ) -> Result<PathBuf> {
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let name = format!("quill-{version}-{board}.bin");
-    let file = folder.join(&name);
-    fs::write(&file, image).with_context(|| file.display().to_string())?;
-    let text = manifest(board, version, &file, key)?;
-    let place = folder.join(format!("{board}.txt"));
-    fs::write(&place, &text).with_context(|| place.display().to_string())?;
-    let one = [text.as_bytes(), image].concat();
+    let image_name = format!("quill-{version}-{board}.bin");
+    let text_name = format!("{board}.txt");
     let one_name = format!("quill-{version}-{board}.update");
-    let one_file = folder.join(&one_name);
-    fs::write(&one_file, &one).with_context(|| one_file.display().to_string())?;
-    let sums: String = [
-        (&*name, image),
-        (&*format!("{board}.txt"), text.as_bytes()),
-        (&*one_name, &*one),
-    ]
-    .iter()
-    .map(|(name, content)| format!("{}  {name}\n", hex(&Sha256::digest(content))))
-    .collect();
-    let checksums = folder.join(format!("{board}.sha256"));
-    fs::write(&checksums, sums).with_context(|| checksums.display().to_string())?;
-    Ok(place)
+    let text = manifest(board, version, &image_name, image, key)?;
+    let one = [text.as_bytes(), image].concat();
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let put = |name: &str, content: &[u8]| {
+        let file = folder.join(name);
+        fs::write(&file, content).with_context(|| file.display().to_string())?;
+        Ok::<_, anyhow::Error>(file)
+    };
+    let mut sums = String::new();
+    for (name, content) in [
+        (&image_name, image),
+        (&text_name, text.as_bytes()),
+        (&one_name, &one),
+    ] {
+        put(name, content)?;
+        sums += &format!("{}  {name}\n", hex(&Sha256::digest(content)));
+    }
+    put(&format!("{board}.sha256"), sums.as_bytes())?;
+    Ok(folder.join(text_name))
 }
 
 /// That a key is the one built into the firmware: `QUILL_UPDATE_KEY` of this environment, or the
