@@ -3,12 +3,10 @@
 mod fitting;
 
 use super::refusal::Refusal;
-use crate::arm::{NibShift, ZMap};
+use super::request::Request;
 use crate::drawings::{ButtonDraws, MAX_DRAWINGS, Replay, Slot};
 use crate::machine::{Bare, Manner};
-use crate::motion::{
-    Coordinate, MAX_COORDINATE, MAX_SCALE, Micros, StepRange, StepSize, Transform,
-};
+use crate::motion::{Coordinate, MAX_COORDINATE, MAX_SCALE, StepRange, StepSize, Transform};
 use crate::settings::{AccessPointName, MAX_NAME, MachineName, StartMode};
 use crate::text::{Text, Words};
 use crate::update::{MAX_ADDRESS, ManifestAddress};
@@ -21,8 +19,6 @@ pub enum Command {
     Nothing,
     /// G00, G01.
     Move(Manner, Axes),
-    /// G28.
-    Home,
     /// G54: offsets in 1/65536 units, scale in 1/2^32 and not zero.
     Transform {
         /// Offset of X.
@@ -32,104 +28,10 @@ pub enum Command {
         /// Scale of X and Y.
         scale: Option<i64>,
     },
-    /// G94.
-    Speed {
-        /// S, or its alias F.
-        pen_down: Option<StepSize>,
-        /// P.
-        pen_up: Option<StepSize>,
-    },
-    /// M114.
-    Position,
-    /// `M114 S`.
-    Angles,
-    /// M115.
-    Capabilities,
-    /// M122.
-    Diagnostics,
-    /// M374.
-    Calibrate,
-    /// `M374 Sclear`.
-    ClearCalibration,
-    /// M550.
-    Name,
-    /// `M550 P`.
-    Rename(MachineName),
-    /// M552.
-    Start,
-    /// `M552 S P`.
-    SetStart {
-        /// What the machine is after power-on.
-        mode: Option<StartMode>,
-        /// How its own network is called.
-        name: Option<AccessPointName>,
-    },
-    /// M589.
-    OwnNetwork,
-    /// `M589 P`: the password of the machine's own network, `None` for an open one.
-    ProtectOwnNetwork(Option<Password>),
-    /// M291.
-    Waves,
-    /// `M291 S1`, `M291 S2`.
-    SetWaves(bool),
-    /// M587.
-    Networks,
-    /// `M587 S P`.
-    Remember {
-        /// The network's name.
-        ssid: Ssid,
-        /// Its password; without one, the one that is remembered, or none.
-        password: Option<Password>,
-    },
-    /// `M588 S`.
-    Forget(Ssid),
-    /// `M588 S*`.
-    ForgetAll,
-    /// M997.
-    Update,
-    /// `M997 S`: where to ask from now on; with an empty text, nowhere.
-    SetUpdateAddress(Option<ManifestAddress>),
-    /// M20.
-    Drawings,
-    /// M39.
-    Space,
-    /// M23.
-    Button,
-    /// `M23 S`, `M23 S2 K`.
-    SetButton(ButtonDraws),
-    /// `M23 K`.
-    Draw(Slot),
-    /// `M23 K0`.
-    StopDrawing,
-    /// `M28 S`.
-    Record(Slot),
-    /// M29.
-    EndRecording,
-    /// `M30 S`.
-    Delete(Slot),
-    /// M85.
-    Replaying,
-    /// `M85 S P K`; `M85 S0` for `None`.
-    SetReplay(Option<Replay>),
-    /// G4.
-    Dwell(Micros),
-    /// G31.
-    Compensation,
-    /// `G31 S`, `G31 P`.
-    SetCompensation {
-        /// How high the paper lies.
-        map: Option<ZMap>,
-        /// How the nib moves as it comes down.
-        shift: Option<NibShift>,
-    },
     /// G40.
     Uncalibrated(Axes, Bare),
-    /// `M171 Sconfirm`.
-    FactoryReset,
-    /// M280.
-    Directions,
-    /// `M280 S E P`: whether shoulder, elbow and pen turn the other way.
-    SetDirections([Option<bool>; 3]),
+    /// Everything else: scale and origin of the connection have no part in it.
+    Ask(Request),
 }
 
 /// Coordinates of a move as written, in 1/65536 units, within +-[`MAX_COORDINATE`]; any of them may be
@@ -172,23 +74,23 @@ fn other_than_a_move<'a>(
     mut words: Words<'a>,
     line: &'a [u8],
 ) -> Result<Command, Refusal<'a>> {
-    match code {
+    let request = match code {
+        (b'G', 40) => return fitting::uncalibrated(&mut words),
+        (b'G', 54) => return transform(&mut words),
         (b'G', 4) => fitting::dwell(&mut words),
-        (b'G', 28) => without_parameters(&mut words, Command::Home),
+        (b'G', 28) => without_parameters(&mut words, Request::HOME),
         (b'G', 31) => fitting::compensation(&mut words),
-        (b'G', 40) => fitting::uncalibrated(&mut words),
-        (b'G', 54) => transform(&mut words),
         (b'G', 94) => speed(&mut words),
-        (b'M', 20) => without_parameters(&mut words, Command::Drawings),
+        (b'M', 20) => without_parameters(&mut words, Request::Drawings),
         (b'M', 23) => button(&mut words),
-        (b'M', 28) => Ok(Command::Record(one_slot(&mut words)?)),
-        (b'M', 29) => without_parameters(&mut words, Command::EndRecording),
-        (b'M', 30) => Ok(Command::Delete(one_slot(&mut words)?)),
-        (b'M', 39) => without_parameters(&mut words, Command::Space),
+        (b'M', 28) => Ok(Request::BeginRecording(one_slot(&mut words)?)),
+        (b'M', 29) => without_parameters(&mut words, Request::EndRecording),
+        (b'M', 30) => Ok(Request::Delete(one_slot(&mut words)?)),
+        (b'M', 39) => without_parameters(&mut words, Request::Space),
         (b'M', 85) => replay(&mut words),
         (b'M', 114) => position(&mut words),
-        (b'M', 115) => without_parameters(&mut words, Command::Capabilities),
-        (b'M', 122) => without_parameters(&mut words, Command::Diagnostics),
+        (b'M', 115) => without_parameters(&mut words, Request::Capabilities),
+        (b'M', 122) => without_parameters(&mut words, Request::Diagnostics),
         (b'M', number @ (170 | 172)) => Err(Refusal::Reserved(number)),
         (b'M', 171) => fitting::factory_reset(&mut words),
         (b'M', 280) => fitting::directions(&mut words),
@@ -201,7 +103,8 @@ fn other_than_a_move<'a>(
         (b'M', 589) => own_network(&mut words),
         (b'M', 997) => update(&mut words),
         _ => Err(Words::new(line).unknown().into()),
-    }
+    };
+    request.map(Command::Ask)
 }
 
 /// Letters met so far on the line.
@@ -269,7 +172,7 @@ fn transform<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     Ok(Command::Transform { x, y, scale })
 }
 
-fn speed<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn speed<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     let mut letters = Letters::default();
     let (mut pen_down, mut pen_up) = (None, None);
     while let Some(letter) = words.letter()? {
@@ -282,61 +185,61 @@ fn speed<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
             _ => return Err(Refusal::UnknownParameter(letter)),
         }
     }
-    Ok(Command::Speed { pen_down, pen_up })
+    Ok(Request::SetSpeed { pen_down, pen_up })
 }
 
-fn position<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn position<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
-        None => Ok(Command::Position),
+        None => Ok(Request::Position),
         Some('S') => {
             words.no_value('S')?;
-            nothing_after('S', words, Command::Angles)
+            nothing_after('S', words, Request::Angles)
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
 }
 
-fn calibration<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn calibration<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
-        None => Ok(Command::Calibrate),
+        None => Ok(Request::Calibrate),
         Some('S') => {
             let text = words.text('S')?;
             if !text.is("clear") {
                 return Err(Refusal::BadText('S', text.raw(), "'clear'"));
             }
-            nothing_after('S', words, Command::ClearCalibration)
+            nothing_after('S', words, Request::ClearCalibration)
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
 }
 
-fn name<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn name<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
-        None => Ok(Command::Name),
+        None => Ok(Request::Name),
         Some('P') => {
             let text = words.text('P')?;
             let name = text
                 .unescape::<MAX_NAME>()
                 .and_then(|name| MachineName::new(str::from_utf8(&name).ok()?))
                 .ok_or(Refusal::BadName(text.raw()))?;
-            nothing_after('P', words, Command::Rename(name))
+            nothing_after('P', words, Request::Rename(name))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
 }
 
-fn waves<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn waves<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
-        None => Ok(Command::Waves),
+        None => Ok(Request::Waves),
         Some('S') => {
             let on = choice(words, 'S', 2)? == 1;
-            nothing_after('S', words, Command::SetWaves(on))
+            nothing_after('S', words, Request::SetWaves(on))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
 }
 
-fn start<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn start<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     let mut letters = Letters::default();
     let (mut mode, mut name) = (None, None);
     while let Some(letter) = words.letter()? {
@@ -348,12 +251,12 @@ fn start<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         }
     }
     Ok(match (mode, name) {
-        (None, None) => Command::Start,
-        (mode, name) => Command::SetStart { mode, name },
+        (None, None) => Request::Start,
+        (mode, name) => Request::SetStart { mode, name },
     })
 }
 
-fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn network<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     let mut letters = Letters::default();
     let (mut ssid, mut password) = (None, None);
     while let Some(letter) = words.letter()? {
@@ -365,20 +268,20 @@ fn network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         }
     }
     match (ssid, password) {
-        (Some(ssid), password) => Ok(Command::Remember { ssid, password }),
+        (Some(ssid), password) => Ok(Request::Remember { ssid, password }),
         (None, Some(_)) => Err(Refusal::Missing('S')),
-        (None, None) => Ok(Command::Networks),
+        (None, None) => Ok(Request::Networks),
     }
 }
 
-fn forget<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn forget<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
         None => Err(Refusal::Missing('S')),
         Some('S') => {
             let ssid = network_name(words)?;
             let command = match ssid.as_bytes() {
-                b"*" => Command::ForgetAll,
-                _ => Command::Forget(ssid),
+                b"*" => Request::ForgetAll,
+                _ => Request::Forget(ssid),
             };
             nothing_after('S', words, command)
         }
@@ -386,9 +289,9 @@ fn forget<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     }
 }
 
-fn update<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn update<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
-        None => Ok(Command::Update),
+        None => Ok(Request::Update),
         Some('S') => {
             let text = words.text('S')?;
             let address = match text.unescape::<MAX_ADDRESS>() {
@@ -400,23 +303,23 @@ fn update<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
                     Some(address.ok_or(Refusal::BadAddress(text.raw()))?)
                 }
             };
-            nothing_after('S', words, Command::SetUpdateAddress(address))
+            nothing_after('S', words, Request::SetUpdateAddress(address))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
 }
 
 /// M589 is where RepRap firmware has the password of a machine's own network.
-fn own_network<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn own_network<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
-        None => Ok(Command::OwnNetwork),
+        None => Ok(Request::OwnNetwork),
         Some('P') => {
             let text = words.text('P')?;
             let password = match text.raw() {
                 [] => None,
                 _ => Some(network_password(&text)?),
             };
-            nothing_after('P', words, Command::ProtectOwnNetwork(password))
+            nothing_after('P', words, Request::ProtectOwnNetwork(password))
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
@@ -435,7 +338,7 @@ fn network_name<'a>(words: &mut Words<'a>) -> Result<Ssid, Refusal<'a>> {
         .ok_or(Refusal::BadText('S', text.raw(), "1 to 32 bytes"))
 }
 
-fn button<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn button<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     let mut letters = Letters::default();
     let (mut number, mut place) = (None, None);
     while let Some(letter) = words.letter()? {
@@ -448,13 +351,13 @@ fn button<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
     }
     let Some(number) = number else {
         return Ok(match place.map(Slot::new) {
-            None => Command::Button,
-            Some(Some(slot)) => Command::Draw(slot),
-            Some(None) => Command::StopDrawing,
+            None => Request::Button,
+            Some(Some(slot)) => Request::Draw(slot),
+            Some(None) => Request::StopDrawing,
         });
     };
     match (ButtonDraws::new(number, place.and_then(Slot::new)), place) {
-        (Some(choice), _) => Ok(Command::SetButton(choice)),
+        (Some(choice), _) => Ok(Request::SetButton(choice)),
         (None, None) => Err(Refusal::Missing('K')),
         (None, Some(0)) => Err(Refusal::NotWhole {
             letter: 'K',
@@ -485,7 +388,7 @@ fn slot<'a>(words: &mut Words<'a>, letter: char) -> Result<Slot, Refusal<'a>> {
     Ok(Slot::new(number as u8).unwrap_or(Slot::FIRST))
 }
 
-fn replay<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+fn replay<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     let mut letters = Letters::default();
     let (mut seconds, mut every, mut place) = (None, None, None);
     while let Some(letter) = words.letter()? {
@@ -498,9 +401,9 @@ fn replay<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
         }
     }
     Ok(match (seconds, every, place) {
-        (None, None, None) => Command::Replaying,
-        (Some(0), ..) => Command::SetReplay(None),
-        _ => Command::SetReplay(Some(Replay {
+        (None, None, None) => Request::Replaying,
+        (Some(0), ..) => Request::SetReplay(None),
+        _ => Request::SetReplay(Some(Replay {
             slot: place.unwrap_or(Slot::FIRST),
             seconds: seconds.unwrap_or(Replay::DEFAULT_SECONDS),
             every: every.unwrap_or(Replay::DEFAULT_EVERY),
@@ -545,9 +448,9 @@ fn choice<'a>(words: &mut Words<'a>, letter: char, most: u8) -> Result<u8, Refus
 }
 
 /// The command, if nothing more follows.
-fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Command, Refusal<'a>> {
+fn without_parameters<'a>(words: &mut Words<'a>, request: Request) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
-        None => Ok(command),
+        None => Ok(request),
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
 }
@@ -556,12 +459,12 @@ fn without_parameters<'a>(words: &mut Words<'a>, command: Command) -> Result<Com
 fn nothing_after<'a>(
     only: char,
     words: &mut Words<'a>,
-    command: Command,
-) -> Result<Command, Refusal<'a>> {
+    request: Request,
+) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
         Some(letter) if letter == only => Err(Refusal::Repeated(letter)),
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
-        None => Ok(command),
+        None => Ok(request),
     }
 }
 

@@ -5,9 +5,11 @@ mod command;
 mod recording;
 mod refusal;
 mod reply;
+mod request;
 mod session;
 
 pub use command::{Command, parse};
 pub use refusal::Refusal;
 pub use reply::{Diagnostics, Identity, InWords, MAX_REPLY, Reply, STOPPED, TERMINATOR, VERSION};
-pub use session::{Request, Session};
+pub use request::Request;
+pub use session::Session;

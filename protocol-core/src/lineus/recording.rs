@@ -4,9 +4,7 @@
 use super::command::{Command, parse};
 use super::refusal::Refusal;
 use super::reply::Reply;
-use super::session;
-use super::session::Request;
-use crate::motion::Transform;
+use super::request::Request;
 use crate::text::{MAX_LINE, WordError, Words};
 use heapless::Vec;
 
@@ -24,51 +22,49 @@ enum Fate {
     Refused,
 }
 
-const fn fate(command: &Command) -> Fate {
-    match command {
-        Command::Nothing
-        | Command::Move(..)
-        | Command::Home
-        | Command::Transform { .. }
-        | Command::Speed { .. }
-        | Command::Dwell(_)
-        | Command::Uncalibrated(..) => Fate::Kept,
-        Command::Position
-        | Command::Angles
-        | Command::Capabilities
-        | Command::Diagnostics
-        | Command::Name
-        | Command::Start
-        | Command::Waves
-        | Command::Networks
-        | Command::Drawings
-        | Command::Space
-        | Command::Button
-        | Command::Compensation
-        | Command::Directions
-        | Command::OwnNetwork
-        | Command::Replaying => Fate::Answered,
-        Command::EndRecording => Fate::End,
-        Command::Calibrate
-        | Command::ClearCalibration
-        | Command::Rename(_)
-        | Command::SetStart { .. }
-        | Command::SetWaves(_)
-        | Command::Remember { .. }
-        | Command::Forget(_)
-        | Command::ForgetAll
-        | Command::SetButton(_)
-        | Command::Draw(_)
-        | Command::StopDrawing
-        | Command::Record(_)
-        | Command::Delete(_)
-        | Command::SetCompensation { .. }
-        | Command::SetDirections(_)
-        | Command::FactoryReset
-        | Command::ProtectOwnNetwork(_)
-        | Command::Update
-        | Command::SetUpdateAddress(_)
-        | Command::SetReplay(_) => Fate::Refused,
+const fn fate(request: &Request) -> Fate {
+    match request {
+        Request::Errand(_) | Request::SetSpeed { .. } => Fate::Kept,
+        Request::Position
+        | Request::Angles
+        | Request::Capabilities
+        | Request::Diagnostics
+        | Request::Name
+        | Request::Start
+        | Request::Waves
+        | Request::Networks
+        | Request::Drawings
+        | Request::Space
+        | Request::Button
+        | Request::Compensation
+        | Request::Directions
+        | Request::OwnNetwork
+        | Request::Replaying => Fate::Answered,
+        Request::EndRecording => Fate::End,
+        Request::Calibrate
+        | Request::ClearCalibration
+        | Request::Rename(_)
+        | Request::SetStart { .. }
+        | Request::SetWaves(_)
+        | Request::Remember { .. }
+        | Request::Forget(_)
+        | Request::ForgetAll
+        | Request::SetButton(_)
+        | Request::Draw(_)
+        | Request::StopDrawing
+        | Request::BeginRecording(_)
+        | Request::Delete(_)
+        | Request::SetCompensation { .. }
+        | Request::SetDirections(_)
+        | Request::FactoryReset
+        | Request::ProtectOwnNetwork(_)
+        | Request::Update
+        | Request::SetUpdateAddress(_)
+        | Request::SetReplay(_)
+        // Nothing that a line asks for.
+        | Request::Answered
+        | Request::HangUp
+        | Request::RecordLine => Fate::Refused,
     }
 }
 
@@ -86,18 +82,16 @@ pub(super) fn request(
             return Request::Answered;
         }
     };
-    match fate(&command) {
-        Fate::Kept => {
-            recorded.clear();
-            // A line is never longer.
-            let _ = recorded.extend_from_slice(line);
-            Request::RecordLine
-        }
-        // Neither is a move, so that scale and origin do not matter.
-        Fate::Answered | Fate::End => {
-            let mut unused = Transform::IDENTITY;
-            session::request(&mut unused, &command, reply)
-        }
+    let request = match command {
+        Command::Ask(request) => request,
+        Command::Nothing
+        | Command::Move(..)
+        | Command::Transform { .. }
+        | Command::Uncalibrated(..) => return keep(line, recorded),
+    };
+    match fate(&request) {
+        Fate::Kept => keep(line, recorded),
+        Fate::Answered | Fate::End => request,
         Fate::Refused => {
             let code = match Words::new(line).unknown() {
                 WordError::NoCode(code) => code,
@@ -107,6 +101,13 @@ pub(super) fn request(
             Request::Answered
         }
     }
+}
+
+fn keep(line: &[u8], recorded: &mut Vec<u8, MAX_LINE>) -> Request {
+    recorded.clear();
+    // A line is never longer.
+    let _ = recorded.extend_from_slice(line);
+    Request::RecordLine
 }
 
 #[cfg(test)]

@@ -4,128 +4,11 @@ use super::command::{Command, parse};
 use super::recording;
 use super::refusal::Refusal;
 use super::reply::Reply;
-use crate::arm::{NibShift, ZMap};
-use crate::drawings::{ButtonDraws, Replay, Slot};
-use crate::machine::{Errand, Manner, Target};
-use crate::motion::{StepSize, Transform, WideCoordinate};
-use crate::settings::{AccessPointName, MachineName, StartMode};
+use super::request::Request;
+use crate::machine::{Errand, Target};
+use crate::motion::{Transform, WideCoordinate};
 use crate::text::{LineBuffer, MAX_LINE, Words};
-use crate::update::ManifestAddress;
-use crate::wifi::{Password, Ssid};
 use heapless::Vec;
-
-/// What a line asks for, in arm coordinates; each is answered by exactly one reply.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// Nothing more to do: the reply has been written.
-    Answered,
-    /// The same, and nothing more of this connection is to be executed: a browser sends what some page
-    /// from elsewhere made up, and commands would come next.
-    HangUp,
-    /// To be answered by [`Reply::report`].
-    Errand(Errand),
-    /// To be answered by [`Reply::ok`].
-    SetSpeed {
-        /// Step with the pen down.
-        pen_down: Option<StepSize>,
-        /// Step with the pen up.
-        pen_up: Option<StepSize>,
-    },
-    /// To be answered by [`Reply::position`].
-    Position,
-    /// To be answered by [`Reply::angles`].
-    Angles,
-    /// To be answered by [`Reply::capabilities`].
-    Capabilities,
-    /// To be answered by [`Reply::diagnostics`].
-    Diagnostics,
-    /// Make the place where the arm rests the calibration point.
-    Calibrate,
-    /// Remove the calibration.
-    ClearCalibration,
-    /// To be answered by [`Reply::name`].
-    Name,
-    /// To be answered by [`Reply::name`].
-    Rename(MachineName),
-    /// To be answered by [`Reply::start`].
-    Start,
-    /// To be remembered, and answered by [`Reply::ok`].
-    SetStart {
-        /// What the machine is after power-on.
-        mode: Option<StartMode>,
-        /// How its own network is called.
-        name: Option<AccessPointName>,
-    },
-    /// To be answered by [`Reply::own_network`].
-    OwnNetwork,
-    /// The password of the machine's own network, `None` for an open one; to be remembered, and answered by
-    /// [`Reply::ok`].
-    ProtectOwnNetwork(Option<Password>),
-    /// To be answered by [`Reply::waves`].
-    Waves,
-    /// To be remembered, and answered by [`Reply::ok`].
-    SetWaves(bool),
-    /// To be answered by [`Reply::networks`].
-    Networks,
-    /// A station remembers the network and answers [`Reply::ok`]; in setup the answer comes first, and
-    /// the network is remembered when it has been joined.
-    Remember {
-        /// The network's name.
-        ssid: Ssid,
-        /// Its password; without one, the one that is remembered, or none.
-        password: Option<Password>,
-    },
-    /// To be forgotten, and answered by [`Reply::ok`].
-    Forget(Ssid),
-    /// Every network is to be forgotten; answered by [`Reply::ok`].
-    ForgetAll,
-    /// To be answered by [`Reply::updated`] when the new firmware is about to start, or by
-    /// [`Reply::error`].
-    Update,
-    /// To be remembered, and answered by [`Reply::ok`].
-    SetUpdateAddress(Option<ManifestAddress>),
-    /// To be answered by [`Reply::drawings`].
-    Drawings,
-    /// To be answered by [`Reply::space`].
-    Space,
-    /// To be answered by [`Reply::button`].
-    Button,
-    /// To be remembered, and answered by [`Reply::ok`].
-    SetButton(ButtonDraws),
-    /// To be drawn from memory, and answered by [`Reply::ok`] when it begins.
-    Draw(Slot),
-    /// What is drawn from memory is to end, if anything is.
-    StopDrawing,
-    /// To be answered by [`Reply::ok`], and [`Session::record`] told when that is possible.
-    BeginRecording(Slot),
-    /// [`Session::recorded_line`] is to be kept, and answered by [`Reply::ok`].
-    RecordLine,
-    /// What was recorded is to become a drawing; [`Session::record`] is told. Comes when nothing is recorded
-    /// as well.
-    EndRecording,
-    /// To be deleted, and answered by [`Reply::ok`].
-    Delete(Slot),
-    /// To be answered by [`Reply::replay`].
-    Replaying,
-    /// To be answered by [`Reply::ok`].
-    SetReplay(Option<Replay>),
-    /// To be answered by [`Reply::compensation`].
-    Compensation,
-    /// To be remembered, and answered by [`Reply::ok`].
-    SetCompensation {
-        /// How high the paper lies.
-        map: Option<ZMap>,
-        /// How the nib moves as it comes down.
-        shift: Option<NibShift>,
-    },
-    /// Everything is to be forgotten; answered by [`Reply::ok`].
-    FactoryReset,
-    /// To be answered by [`Reply::directions`].
-    Directions,
-    /// To be remembered, and answered by [`Reply::ok`]: whether shoulder, elbow and pen turn the other
-    /// way.
-    SetDirections([Option<bool>; 3]),
-}
 
 /// What belongs to one connection: the line being received, scale and origin, and whether what comes is
 /// recorded instead of drawn.
@@ -242,11 +125,7 @@ fn allowed(line: &[u8]) -> Result<(), Refusal<'_>> {
 }
 
 #[inline]
-pub(super) fn request(
-    scale_and_origin: &mut Transform,
-    command: &Command,
-    reply: &mut Reply,
-) -> Request {
+fn request(scale_and_origin: &mut Transform, command: &Command, reply: &mut Reply) -> Request {
     match command {
         Command::Move(manner, axes) => {
             let [x, y, z] = axes.to_array();
@@ -271,54 +150,6 @@ pub(super) fn request(
             reply.ok();
             Request::Answered
         }
-        Command::Home => Request::Errand(Errand::Move(Manner::Straight, Target::HOME)),
-        Command::Speed { pen_down, pen_up } => Request::SetSpeed {
-            pen_down: *pen_down,
-            pen_up: *pen_up,
-        },
-        Command::Position => Request::Position,
-        Command::Angles => Request::Angles,
-        Command::Capabilities => Request::Capabilities,
-        Command::Diagnostics => Request::Diagnostics,
-        Command::Calibrate => Request::Calibrate,
-        Command::ClearCalibration => Request::ClearCalibration,
-        Command::Name => Request::Name,
-        Command::Rename(name) => Request::Rename(name.clone()),
-        Command::Start => Request::Start,
-        Command::OwnNetwork => Request::OwnNetwork,
-        Command::ProtectOwnNetwork(password) => Request::ProtectOwnNetwork(password.clone()),
-        Command::SetStart { mode, name } => Request::SetStart {
-            mode: *mode,
-            name: *name,
-        },
-        Command::Waves => Request::Waves,
-        Command::SetWaves(on) => Request::SetWaves(*on),
-        Command::Networks => Request::Networks,
-        Command::Remember { ssid, password } => Request::Remember {
-            ssid: ssid.clone(),
-            password: password.clone(),
-        },
-        Command::Forget(ssid) => Request::Forget(ssid.clone()),
-        Command::ForgetAll => Request::ForgetAll,
-        Command::Update => Request::Update,
-        Command::SetUpdateAddress(address) => Request::SetUpdateAddress(address.clone()),
-        Command::Drawings => Request::Drawings,
-        Command::Space => Request::Space,
-        Command::Button => Request::Button,
-        Command::SetButton(choice) => Request::SetButton(*choice),
-        Command::Draw(slot) => Request::Draw(*slot),
-        Command::StopDrawing => Request::StopDrawing,
-        Command::Record(slot) => Request::BeginRecording(*slot),
-        Command::EndRecording => Request::EndRecording,
-        Command::Delete(slot) => Request::Delete(*slot),
-        Command::Replaying => Request::Replaying,
-        Command::SetReplay(replay) => Request::SetReplay(*replay),
-        Command::Dwell(duration) => Request::Errand(Errand::Dwell(*duration)),
-        Command::Compensation => Request::Compensation,
-        Command::SetCompensation { map, shift } => Request::SetCompensation {
-            map: *map,
-            shift: *shift,
-        },
         Command::Uncalibrated(axes, bare) => {
             let [x, y, z] = axes.to_array();
             let here = match bare.xy {
@@ -332,9 +163,7 @@ pub(super) fn request(
             };
             Request::Errand(Errand::Uncalibrated(target, *bare))
         }
-        Command::FactoryReset => Request::FactoryReset,
-        Command::Directions => Request::Directions,
-        Command::SetDirections(servos) => Request::SetDirections(*servos),
+        Command::Ask(request) => request.clone(),
     }
 }
 
@@ -342,8 +171,12 @@ pub(super) fn request(
 mod tests {
     extern crate std;
     use super::*;
-    use crate::machine::Bare;
-    use crate::motion::Micros;
+    use crate::arm::{NibShift, ZMap};
+    use crate::drawings::{ButtonDraws, Replay, Slot};
+    use crate::machine::{Bare, Manner};
+    use crate::motion::{Micros, StepSize};
+    use crate::settings::{AccessPointName, MachineName, StartMode};
+    use crate::update::ManifestAddress;
     use crate::wifi::{Password, Ssid};
     use proptest::prelude::*;
     use std::string::{String, ToString};

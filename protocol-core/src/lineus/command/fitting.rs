@@ -1,14 +1,14 @@
 //! Commands about this arm and its paper, and two of motion: G4, G31, G40, M171, M280.
 
-use super::{Axes, Command, Letters, choice, coordinate, fixed, nothing_after};
+use super::{Axes, Command, Letters, Request, choice, coordinate, fixed, nothing_after};
 use crate::arm::{NibShift, ZMap};
 use crate::lineus::Refusal;
-use crate::machine::Bare;
+use crate::machine::{Bare, Errand};
 use crate::motion::{MOST_DWELL, Micros};
 use crate::text::Words;
 
 /// P, or S, in seconds, at most [`MOST_DWELL`].
-pub(super) fn dwell<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+pub(super) fn dwell<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     const BITS: u32 = 24;
     const MOST: u32 = (MOST_DWELL.get() / 1_000_000) as u32;
     let mut duration = None;
@@ -30,11 +30,12 @@ pub(super) fn dwell<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
             _ => return Err(Refusal::UnknownParameter(letter)),
         }
     }
-    duration.map(Command::Dwell).ok_or(Refusal::Missing('P'))
+    let dwell = |duration| Request::Errand(Errand::Dwell(duration));
+    duration.map(dwell).ok_or(Refusal::Missing('P'))
 }
 
 /// S is the map, P the shift in millimetres.
-pub(super) fn compensation<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+pub(super) fn compensation<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     let mut letters = Letters::default();
     let (mut map, mut shift) = (None, None);
     while let Some(letter) = words.letter()? {
@@ -46,8 +47,8 @@ pub(super) fn compensation<'a>(words: &mut Words<'a>) -> Result<Command, Refusal
         }
     }
     Ok(match (map, shift) {
-        (None, None) => Command::Compensation,
-        (map, shift) => Command::SetCompensation { map, shift },
+        (None, None) => Request::Compensation,
+        (map, shift) => Request::SetCompensation { map, shift },
     })
 }
 
@@ -103,7 +104,7 @@ pub(super) fn uncalibrated<'a>(words: &mut Words<'a>) -> Result<Command, Refusal
 }
 
 /// Without the word nothing is forgotten by mistake.
-pub(super) fn factory_reset<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+pub(super) fn factory_reset<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     match words.letter()? {
         None => Err(Refusal::Missing('S')),
         Some('S') => {
@@ -111,14 +112,14 @@ pub(super) fn factory_reset<'a>(words: &mut Words<'a>) -> Result<Command, Refusa
             if !text.is("confirm") {
                 return Err(Refusal::BadText('S', text.raw(), "'confirm'"));
             }
-            nothing_after('S', words, Command::FactoryReset)
+            nothing_after('S', words, Request::FactoryReset)
         }
         Some(letter) => Err(Refusal::UnknownParameter(letter)),
     }
 }
 
 /// S, E and P, the servos as M114 names them: 1 as the board says, 2 the other way.
-pub(super) fn directions<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'a>> {
+pub(super) fn directions<'a>(words: &mut Words<'a>) -> Result<Request, Refusal<'a>> {
     let mut letters = Letters::default();
     let [mut shoulder, mut elbow, mut pen] = [None; 3];
     while let Some(letter) = words.letter()? {
@@ -132,7 +133,7 @@ pub(super) fn directions<'a>(words: &mut Words<'a>) -> Result<Command, Refusal<'
         *servo = Some(choice(words, letter, 2)? == 2);
     }
     Ok(match [shoulder, elbow, pen] {
-        [None, None, None] => Command::Directions,
-        servos => Command::SetDirections(servos),
+        [None, None, None] => Request::Directions,
+        servos => Request::SetDirections(servos),
     })
 }
