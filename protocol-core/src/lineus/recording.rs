@@ -13,10 +13,8 @@ use heapless::Vec;
 enum Fate {
     /// It is part of the drawing.
     Kept,
-    /// It asks something and changes nothing: it is answered.
-    Answered,
-    /// It ends the recording.
-    End,
+    /// It asks something and changes nothing, or ends the recording: it is done as ever.
+    Done,
     /// It has no place in a drawing: another recording, what is remembered, what is drawn from memory, new
     /// firmware.
     Refused,
@@ -39,8 +37,8 @@ const fn fate(request: &Request) -> Fate {
         | Request::Compensation
         | Request::Directions
         | Request::OwnNetwork
-        | Request::Replaying => Fate::Answered,
-        Request::EndRecording => Fate::End,
+        | Request::Replaying
+        | Request::EndRecording => Fate::Done,
         Request::Calibrate
         | Request::ClearCalibration
         | Request::Rename(_)
@@ -91,7 +89,7 @@ pub(super) fn request(
     };
     match fate(&request) {
         Fate::Kept => keep(line, recorded),
-        Fate::Answered | Fate::End => request,
+        Fate::Done => request,
         Fate::Refused => {
             let code = match Words::new(line).unknown() {
                 WordError::NoCode(code) => code,
