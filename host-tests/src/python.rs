@@ -4,6 +4,7 @@ use crate::desktop::target_folder;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::{Mutex, PoisonError};
 
 /// What has to be on the computer, and cannot be had from cargo.
 const NEEDS: &str = "This test needs Python 3 with venv, a C compiler and Python's headers (for netifaces), and \
@@ -21,6 +22,9 @@ pub fn client(file: &str) -> PathBuf {
 /// # Panics
 /// When it cannot be made.
 pub fn python(name: &str, packages: &[&str]) -> PathBuf {
+    // Tests side by side may want the same one, and it is made once.
+    static TURN: Mutex<()> = Mutex::new(());
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let environment = target_folder().join(name);
     let python = environment.join("bin/python");
     // Written last: an environment without it was not finished.
