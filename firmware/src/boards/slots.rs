@@ -8,16 +8,34 @@ use protocol_core::update::Slot;
 
 /// The slots of a flash of the kind `F`.
 pub struct PartitionedSlots<F: MultiwriteNorFlash + 'static> {
-    /// What manifests call this board.
-    pub board: &'static str,
-    /// The slot that runs.
-    pub running: Slot,
-    /// The other one.
-    pub other: Partition<'static, NoopRawMutex, F>,
-    /// The boot choice.
-    pub choice: Partition<'static, NoopRawMutex, F>,
-    /// Starts the firmware that is chosen.
-    pub restart: fn() -> !,
+    board: &'static str,
+    running: Slot,
+    other: Partition<'static, NoopRawMutex, F>,
+    choice: Partition<'static, NoopRawMutex, F>,
+    restart: fn() -> !,
+}
+
+impl<F: MultiwriteNorFlash + 'static> PartitionedSlots<F> {
+    /// Of the board that manifests call `board`, with the slot that runs and both slots' places; `restart` starts
+    /// the firmware that is chosen.
+    pub fn new(
+        board: &'static str,
+        running: Slot,
+        [first, second]: [Partition<'static, NoopRawMutex, F>; 2],
+        choice: Partition<'static, NoopRawMutex, F>,
+        restart: fn() -> !,
+    ) -> Self {
+        Self {
+            board,
+            running,
+            other: match running {
+                Slot::First => second,
+                Slot::Second => first,
+            },
+            choice,
+            restart,
+        }
+    }
 }
 
 impl<F: MultiwriteNorFlash + 'static> FirmwareSlots for PartitionedSlots<F> {

@@ -154,16 +154,10 @@ fn firmware_slots(
     let Some(standing) = block_on(update::at_start(&mut choice, running)) else {
         software_reset();
     };
-    let slots = PartitionedSlots {
-        board: BOARD.update_name,
-        running,
-        other: match running {
-            Slot::First => second,
-            Slot::Second => first,
-        },
-        choice,
-        restart: || software_reset(),
-    };
+    let places = [first, second];
+    let slots = PartitionedSlots::new(BOARD.update_name, running, places, choice, || {
+        software_reset()
+    });
     (slots, standing)
 }
 

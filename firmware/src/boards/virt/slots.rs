@@ -40,15 +40,8 @@ pub const fn choice(chip: &'static Chip) -> FlashPartition {
 
 /// The slots, where this one runs.
 pub fn slots(chip: &'static Chip, running: Slot) -> PartitionedSlots<Flash> {
-    let [first, second] = SLOTS;
-    PartitionedSlots {
-        board: BOARD,
-        running,
-        other: match running {
-            Slot::First => partition(chip, second),
-            Slot::Second => partition(chip, first),
-        },
-        choice: choice(chip),
-        restart: || power::exit(power::RESTART_STATUS),
-    }
+    let places = SLOTS.map(|place| partition(chip, place));
+    PartitionedSlots::new(BOARD, running, places, choice(chip), || {
+        power::exit(power::RESTART_STATUS)
+    })
 }
