@@ -11,5 +11,7 @@ mod web;
 
 pub use client::{Client, TERMINATOR};
 pub use motion::Motion;
-pub use process::{Desktop, PORT, Run, binary, draw, own_address, target_folder, wait_until};
+pub use process::{
+    Desktop, PORT, Run, WEB_PORT, binary, draw, own_address, target_folder, wait_until,
+};
 pub use web::{Answer, Web, WebSocket};

@@ -2,7 +2,7 @@
 //! that survives, and servos of which every pulse is read back.
 
 use host_tests::desktop::serial::SerialPort;
-use host_tests::desktop::{Client, Web, draw, wait_until};
+use host_tests::desktop::{Client, WEB_PORT, Web, draw, own_address, wait_until};
 use host_tests::lasaur::host::LasaurApp;
 use protocol_core::lasaur::BANNER;
 use protocol_core::motion::PEN_UP;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
-use xtask::emulator::{Emulator, FLASH_SIZE, Options, Time, free_address};
+use xtask::emulator::{Emulator, FLASH_SIZE, Options, Time};
 use xtask::ready::{Owner, put_into};
 use xtask::records::{Frame, Record};
 
@@ -45,9 +45,10 @@ impl Machine {
             .expect(
                 "QUILL_VIRT_FIRMWARE names the firmware: run these tests with `cargo xtask test`",
             );
-        let web = free_address().unwrap();
+        let line_us = own_address();
+        let web = SocketAddr::new(line_us.ip(), WEB_PORT);
         let options = Options {
-            line_us: free_address().unwrap(),
+            line_us,
             web: Some(web),
             flash: folder.path().join("flash"),
             time,

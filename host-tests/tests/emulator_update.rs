@@ -1,7 +1,7 @@
 //! The emulated machine updates itself over its network from one build to another, stays there if that works,
 //! and is back if it does not. The emulator's driver is bootloader and watchdog.
 
-use host_tests::desktop::{Client, Web};
+use host_tests::desktop::{Client, WEB_PORT, Web, own_address};
 use host_tests::web_server::serve;
 use protocol_core::update::Version;
 use std::fs;
@@ -11,7 +11,7 @@ use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
 use xtask::board::root;
-use xtask::emulator::{Emulator, Options, RESTART, Time, free_address};
+use xtask::emulator::{Emulator, Options, RESTART, Time};
 use xtask::{release, slots};
 
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -41,9 +41,10 @@ impl Bench {
         let key = release::read_key(&root().join(release::DEVELOPMENT_KEY)).unwrap();
         let version = Version::parse(NEW).unwrap();
         release::release("virt", version, &image, &key, &served).unwrap();
+        let address = own_address();
         Self {
-            address: free_address().unwrap(),
-            web: free_address().unwrap(),
+            address,
+            web: SocketAddr::new(address.ip(), WEB_PORT),
             port: serve(move |name| fs::read(served.join(name)).ok()),
             folder,
         }

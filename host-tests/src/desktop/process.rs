@@ -14,7 +14,7 @@ use std::{env, fs, process, thread};
 /// The port of Line-us, which its clients do not let one choose.
 pub const PORT: u16 = 1337;
 /// The port of its page.
-const WEB_PORT: u16 = 8080;
+pub const WEB_PORT: u16 = 8080;
 /// For what takes milliseconds on an idle computer.
 const PATIENCE: Duration = Duration::from_secs(30);
 
